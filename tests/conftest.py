@@ -96,10 +96,10 @@ def coarsely() -> Callable[[], AbstractContextManager[None]]:
         with pytest.MonkeyPatch.context() as patched:
             patched.setattr(search, "_PROPOSAL_SIZES", (64, 1))
             patched.setattr(search, "_COMPARISON_SIZES", (64, 2))
-            patched.setattr(search, "_EXPONENTS", (0.1, 1.0))
+            patched.setattr(search, "_ANNEALING_EXPONENTS", (0.1, 1.0))
             patched.setattr(search, "_MAX_EXTENSIONS", 0)
             patched.setattr(history, "_START_COUNT", 256)
-            patched.setattr(history, "_STAGES", ((0.15, 6), (0.3, 3), (1.0, 1)))
+            patched.setattr(history, "_FIT_STAGES", ((0.15, 6), (0.3, 3), (1.0, 1)))
             patched.setattr(history, "_CLOUD_SIZE", 16)
             yield
 
@@ -217,7 +217,7 @@ def run(unarranged: None, capsys: pytest.CaptureFixture[str]) -> Callable[..., t
 @pytest.fixture
 def small_budget(monkeypatch: pytest.MonkeyPatch) -> None:
     """Give simulations of ensembles up soon."""
-    monkeypatch.setattr("rocking.engine.tasks.BUDGET", 0)
+    monkeypatch.setattr("rocking.engine.tasks.STEP_BUDGET", 0)
 
 
 @pytest.fixture(scope="session")

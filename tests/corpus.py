@@ -812,7 +812,7 @@ def chattering_times() -> Iterator[Item]:
 @group(digits=6)
 def chattering_sequences() -> Iterator[Item]:
     for a, omega, eta in ((1.03, 2.0, 0.92), (1.01, 0.8, 0.7), (1.2, 5.0, 0.95)):
-        found = chattering.sequence(a, omega, eta)
+        found = chattering.chattering_sequence(a, omega, eta)
         yield "sequence", [found.impacts[:40], found.is_complete, found.time]
         yield "table", chattering.asymptotic_table(a, omega, eta) if found.is_complete else None
 

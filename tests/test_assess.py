@@ -309,3 +309,12 @@ def test_the_friction_of_a_label_is_that_of_surveys_and_of_comparisons_with_rule
     for found in (rocking.survey([block, VASE], motion), rocking.rules.compare_rules([block, VASE], motion)):
         assert [response.overturned for response in found.responses] == [False, True]
         assert found.responses[0].peak_rotation == slides.peak_rotation
+
+
+def test_levels_of_a_measure_that_grows_with_the_square_reach_the_same_factors():
+    """With the Arias intensity the levels extend as far as with the PGA."""
+    by_pga, by_arias = (assess(VASE, MOTIONS, levels=8, measure=measure) for measure in ("pga", "arias"))
+    arias = np.median([motion.arias_intensity for motion in MOTIONS.values()])
+    factor = by_pga.objects[0].levels[-1] / 3.0
+    assert by_arias.objects[0].levels[-1] == pytest.approx(factor**2 * arias, rel=0.6)
+    assert by_arias.objects[0].curve is not None

@@ -41,7 +41,7 @@ def test_table_adds_up_to_eq65():
 def test_speeds_and_phases_of_the_table_are_those_of_the_impacts_as_the_amplitude_falls_to_one():
     eps = 1e-8
     table = chattering.asymptotic_table(1.0 + eps, 2.0, 0.92)
-    impacts = chattering.sequence(1.0 + eps, 2.0, 0.92).impacts[:40]
+    impacts = chattering.chattering_sequence(1.0 + eps, 2.0, 0.92).impacts[:40]
     for name in ("speed_before", "speed_after", "interval"):
         assert table[name][:40] == pytest.approx(impacts[name], rel=1e-6)
     phases = 2.0 * impacts["time"] + np.arcsin(1.0 / (1.0 + eps))
@@ -69,7 +69,7 @@ def test_eq65_is_leading_order_right_and_never_incomplete():
 @pytest.mark.parametrize("omega", [0.5, 1.0, 2.0, 8.0])
 def test_first_interval_and_speed_err_by_the_next_order(omega):
     eps = np.array([1e-4, 1e-3])
-    first = [chattering.sequence(1.0 + e, omega, 0.9).impacts[0] for e in eps]
+    first = [chattering.chattering_sequence(1.0 + e, omega, 0.9).impacts[0] for e in eps]
     interval_error = chattering.first_interval(1.0 + eps, omega) - [impact["interval"] for impact in first]
     speed_error = chattering.first_impact_speed(1.0 + eps, omega) - [impact["speed_before"] for impact in first]
     assert np.diff(np.log(np.abs(interval_error)))[0] / np.log(10.0) == pytest.approx(2.5, abs=0.02)

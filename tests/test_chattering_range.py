@@ -106,11 +106,11 @@ def test_time_and_sequence_have_an_answer_at_every_corner(omega, eta):
     assert 0.0 < critical < 0.38
     below, above = 1.0 + 0.5 * critical, 1.0 + 1.01 * critical
     time = float(chattering.chattering_time(below, omega, eta))
-    sequence = chattering.sequence(below, omega, eta, tolerance=1e-9)
+    sequence = chattering.chattering_sequence(below, omega, eta, tolerance=1e-9)
     assert 0.0 < sequence.lower <= sequence.time <= sequence.upper < np.pi / omega
     assert sequence.time == pytest.approx(time, rel=1e-9)
     assert not chattering.is_complete(above, omega, eta)
-    assert not chattering.sequence(above, omega, eta).is_complete
+    assert not chattering.chattering_sequence(above, omega, eta).is_complete
 
 
 def test_a_place_where_the_correction_of_an_arc_vanishes_is_no_landing():
@@ -127,7 +127,8 @@ def test_within_rounding_of_the_critical_amplitude_there_is_one_verdict():
             a = critical + steps * 2.0**-52
             if a <= 1.0:
                 continue
-            found, time = chattering.sequence(a, omega, eta), float(chattering.chattering_time(a, omega, eta))
+            found = chattering.chattering_sequence(a, omega, eta)
+            time = float(chattering.chattering_time(a, omega, eta))
             assert found.is_complete == np.isfinite(time)
             if found.is_complete:
                 assert found.lower <= found.time <= found.upper

@@ -22,7 +22,7 @@ def test_first_intervals_of_the_reference(reference):
     cases = [case for case in reference["chattering_time"] if "first_intervals" in case]
     assert len(cases) >= 10
     for case in cases:
-        sequence = chattering.sequence(case["a"], case["omega"], case["eta"])
+        sequence = chattering.chattering_sequence(case["a"], case["omega"], case["eta"])
         first = np.array(case["first_intervals"], float)
         assert sequence.impacts["interval"][: first.size] == pytest.approx(first, rel=2e-13)
 
@@ -30,7 +30,7 @@ def test_first_intervals_of_the_reference(reference):
 @pytest.mark.cases(fast=3)
 @pytest.mark.parametrize("case", CASES)
 def test_intervals_and_speeds_agree_with_120_digits(case):
-    impacts = chattering.sequence(*case).impacts
+    impacts = chattering.chattering_sequence(*case).impacts
     # The height of an arc cancels like the square of its duration: 120 digits resolve arcs above 1e-25.
     count = int(np.argmin(np.append(impacts["interval"][:60] > 1e-25, False)))
     intervals, speeds = np.transpose(first_impacts(*case, count))
@@ -41,7 +41,7 @@ def test_intervals_and_speeds_agree_with_120_digits(case):
 
 def test_impacts_keep_the_bookkeeping_of_the_motion():
     eta = 0.8
-    impacts = chattering.sequence(1.03, 2.0, eta).impacts
+    impacts = chattering.chattering_sequence(1.03, 2.0, eta).impacts
     assert impacts["side"][:4].tolist() == [1, -1, 1, -1]
     assert impacts["time"] == pytest.approx(np.cumsum(impacts["interval"]), rel=1e-14)
     assert impacts["speed_after"] == pytest.approx(eta * impacts["speed_before"], rel=1e-15)
@@ -51,7 +51,7 @@ def test_impacts_keep_the_bookkeeping_of_the_motion():
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
 def test_the_bracket_holds_the_rest_of_120_digits(case, tolerance):
     """From the last impact's double-precision time and speed, all that follows is summed in 120 digits."""
-    sequence = chattering.sequence(*case, tolerance=tolerance)
+    sequence = chattering.chattering_sequence(*case, tolerance=tolerance)
     last = sequence.impacts[-1]
     state = (float(last["time"]), int(last["side"]), float(last["speed_after"]))
     assert sequence.lower <= rest_time(*case, start=state, little=1e-12) <= sequence.upper
@@ -60,14 +60,14 @@ def test_the_bracket_holds_the_rest_of_120_digits(case, tolerance):
 
 
 def test_incomplete_sequences_end_at_half_a_period():
-    sequence = chattering.sequence(1.05, 2.0, 0.92)
+    sequence = chattering.chattering_sequence(1.05, 2.0, 0.92)
     assert not sequence.is_complete and np.isnan([sequence.time, sequence.lower, sequence.upper]).all()
     assert 0.0 < sequence.impacts["time"][-1] < np.pi / 2.0
     assert len(first_impacts(1.05, 2.0, 0.92, 100)) == sequence.impacts.size
 
 
 def test_no_rocking_at_the_threshold_of_uplift():
-    sequence = chattering.sequence(1.0, 2.0, 0.92)
+    sequence = chattering.chattering_sequence(1.0, 2.0, 0.92)
     assert sequence.is_complete and sequence.impacts.size == 0 and sequence.time == 0.0
 
 
@@ -83,6 +83,6 @@ def test_intervals_of_every_second_impact_shrink_by_the_square_of_the_restitutio
 
 def test_interval_ratios_end_with_the_sequence():
     ratios = chattering.interval_ratios(1.05, 2.0, 0.92, 50)
-    known = chattering.sequence(1.05, 2.0, 0.92).impacts.size - 2
+    known = chattering.chattering_sequence(1.05, 2.0, 0.92).impacts.size - 2
     assert np.isfinite(ratios[:known]).all() and np.isnan(ratios[known:]).all()
     assert np.isnan(chattering.interval_ratios(1.03, 2.0, 0.01, 200)[-1])

@@ -18,7 +18,7 @@ import rocking
 from rocking import cli
 from rocking.cli import app
 from rocking.core.threads import map_in_threads
-from rocking.errors import INTERRUPTED
+from rocking.errors import INTERRUPT_MESSAGE
 
 BLOCK = ["--half-width", "0.12", "--half-height", "0.55"]
 RECORD = "el-centro-meloland-270"
@@ -144,7 +144,7 @@ def test_an_interrupt_while_the_command_line_is_imported_is_no_traceback():
         )
         done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=False)
         assert done.returncode == code
-        assert (done.stderr == f"{INTERRUPTED}\n") == (code == 130)
+        assert (done.stderr == f"{INTERRUPT_MESSAGE}\n") == (code == 130)
     project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text("utf-8"))
     assert project["project"]["scripts"]["rocking"] == "rocking.__main__:main"
     done = subprocess.run([sys.executable, "-m", "rocking", "--version"], capture_output=True, text=True, check=True)
@@ -178,7 +178,7 @@ def test_an_interrupt_is_one_sentence_and_closes_what_is_half_done(monkeypatch, 
         cli.main([])
     count = len(begun)
     assert ended.value.__context__ is None
-    assert (ended.value.code, capsys.readouterr().err) == (130, f"{INTERRUPTED}\n")
+    assert (ended.value.code, capsys.readouterr().err) == (130, f"{INTERRUPT_MESSAGE}\n")
     time.sleep(0.05)
     assert len(begun) == count < 10
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -196,7 +196,7 @@ def test_an_error_in_place_of_an_interrupt_is_one(run, monkeypatch, interrupted)
 
     monkeypatch.setattr("rocking.cli.find_command", called)
     if interrupted:
-        assert run("records") == (130, "", f"{INTERRUPTED}\n")
+        assert run("records") == (130, "", f"{INTERRUPT_MESSAGE}\n")
     else:
         with pytest.raises(ValueError, match="of its own"):
             run("records")
@@ -219,7 +219,7 @@ def test_an_interrupt_that_python_drops_comes_again(dropped):
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=False, timeout=50.0)
     if dropped == "KeyboardInterrupt":
-        assert (done.returncode, done.stderr) == (130, f"{INTERRUPTED}\n")
+        assert (done.returncode, done.stderr) == (130, f"{INTERRUPT_MESSAGE}\n")
     else:
         assert done.returncode == 0 and "KeyError" in done.stderr
 

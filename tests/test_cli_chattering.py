@@ -6,11 +6,11 @@ import pytest
 
 from rocking.chattering import (
     asymptotic_table,
+    chattering_sequence,
     chattering_time,
     critical_amplitude,
     first_impact_speed,
     first_interval,
-    sequence,
 )
 
 METHODS = ("asymptotic", "series", "semianalytical", "exact")
@@ -24,7 +24,7 @@ def test_chatter_json_is_what_the_functions_give(run):
     assert len(result["chattering_time"]) == 4
     for method, value in result["chattering_time"].items():
         assert value == float(chattering_time(1.03, 2.0, 0.92, method=method))
-    exact = sequence(1.03, 2.0, 0.92)
+    exact = chattering_sequence(1.03, 2.0, 0.92)
     assert (result["bracket"]["lower"], result["bracket"]["upper"]) == (exact.lower, exact.upper)
     assert result["critical_amplitude"] == critical_amplitude(2.0, 0.92)
     assert result["first_interval"]["eq32"] == first_interval(1.03, 2.0)

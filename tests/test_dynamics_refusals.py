@@ -99,9 +99,9 @@ CALLS = [
     (lambda: chattered([1.0, 1.1], [1.0, 2.0, 3.0]), OptionError, "do not broadcast"),
     (lambda: chattered(method="euler"), OptionError, "method must be"),
     (lambda: chattered(method="series", order=2.5), OptionError, "order must be"),
-    (lambda: chattering.sequence([1.03, 1.04], 2.0, 0.92), OptionError, "single number"),
-    (lambda: chattering.sequence(0.99, 2.0, 0.92), OptionError, "so that the block uplifts"),
-    (lambda: chattering.sequence(1.03, 2.0, 0.92, tolerance=0.0), OptionError, "tolerance"),
+    (lambda: chattering.chattering_sequence([1.03, 1.04], 2.0, 0.92), OptionError, "single number"),
+    (lambda: chattering.chattering_sequence(0.99, 2.0, 0.92), OptionError, "so that the block uplifts"),
+    (lambda: chattering.chattering_sequence(1.03, 2.0, 0.92, tolerance=0.0), OptionError, "tolerance"),
     (lambda: chattering.critical_amplitude(2.0, 0.92, method="eq78"), OptionError, "method must be"),
     *(
         (lambda given=given: chattering_map(families.sine(BLOCK), given), OptionError, words)

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::RuntimeWarning")
 
 @pytest.fixture
 def _of_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine, "BUDGET", 10_000)
+    monkeypatch.setattr(engine, "STEP_BUDGET", 10_000)
 
 
 @pytest.mark.usefixtures("_of_few_steps")

@@ -23,7 +23,7 @@ import pytest
 from explorer_client import Client, bearing, clients, let_in, opened_by
 
 import rocking
-from rocking.core.threads import LOOKAHEAD, count_cores
+from rocking.core.threads import ITEMS_AHEAD_PER_THREAD, count_cores
 from rocking.errors import OptionError, RockingError, StudyError
 from rocking.explorer import launch, server, uploads
 from rocking.explorer.core import Explorer
@@ -135,7 +135,7 @@ def test_a_map_comes_coarse_to_fine_and_whole(page):
     order = np.array(strides)
     overtaken = [int(np.sum(order[k:] > stride)) for k, stride in enumerate(strides)]
     assert sorted(set(strides)) == [1, 2, 4, 8] and len(strides) == 20
-    assert max(overtaken) < LOOKAHEAD * count_cores()
+    assert max(overtaken) < ITEMS_AHEAD_PER_THREAD * count_cores()
 
 
 def test_the_case_at_a_point_of_a_map(page):

@@ -70,7 +70,7 @@ for method in ("exact", "semianalytical", "asymptotic", "series"):
     chattering.chattering_time(np.array([1.05, 1.1]), 3.0, 0.9, method=method)
 chattering.chattering_time(1.05, 3.0, 0.9)
 chattering.first_interval(1.05, 3.0)
-chattering.sequence(1.05, 3.0, 0.9)
+chattering.chattering_sequence(1.05, 3.0, 0.9)
 chattering.asymptotic_table(1.05, 3.0, 0.9)
 chattering.critical_amplitude(3.0, [0.8, 0.9])
 chattering.critical_report(3.0, 0.9)

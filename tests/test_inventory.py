@@ -232,3 +232,12 @@ def test_the_coefficient_of_friction_may_have_its_usual_headings(tmp_path: Path,
     path = tmp_path / "objects.csv"
     path.write_text(f"name,width,height,{heading}\nvase,0.24,1.1,0.3\n")
     assert rocking.read_inventory(path)[0].labels == {"name": "vase", "friction": "0.3"}
+
+
+def test_the_first_column_names_the_objects_if_no_other_does(tmp_path):
+    path = tmp_path / "racks.csv"
+    path.write_text("Rack,Width (mm),Height (mm),Room\nR01,600,2000,B\nR02,800,2200,B\n")
+    inventory = rocking.read_inventory(path)
+    assert [block.labels["name"] for block in inventory] == ["R01", "R02"]
+    path.write_text("Width (mm),Height (mm),Room\n600,2000,B\n800,2200,B\n")
+    assert ["name" in block.labels for block in rocking.read_inventory(path)] == [False, False]

@@ -219,7 +219,7 @@ def closed(model: str) -> Numbers:
     yield from chattering.chattering_time([1.02, 1.2, 1.0 + 1e-9, 4.0], [0.5, 2.0, 1.0, 9.0], [0.5, 0.9, 0.7, 0.3])
     yield from chattering.chattering_time([1.02, 1.05], [0.5, 2.0], [0.5, 0.9], method="semianalytical")
     for amplitude, omega, eta in ((1.03, 1.0, 0.7), (1.5, 3.0, 0.9), (1.0 + 1e-7, 0.2, 0.3)):
-        found = chattering.sequence(amplitude, omega, eta)
+        found = chattering.chattering_sequence(amplitude, omega, eta)
         yield from (found.is_complete, found.time, found.lower, found.upper, len(found.impacts))
     for excess in (1e-2, 1e-3, 1e-4, 1e-5):
         yield from chattering.chattering_time(1.0 + excess * np.linspace(1.0, 1.5, 33), 0.5, 0.7)

@@ -402,7 +402,7 @@ def test_a_reversed_record_points_the_other_way():
     turned = east.rotated(north, 90.0)
     times = np.linspace(0.0, 20.0, 501)
     assert turned.acceleration(times) == pytest.approx(east.acceleration(times), abs=1e-12)
-    assert not turned.description.origin.reversed
+    assert not turned.description.origin.is_reversed
 
 
 LINE = Motion([0.0, 1.0], [[1.0]], name="line")

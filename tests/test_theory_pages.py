@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rocking
-from rocking.chattering import critical_amplitude, sequence
+from rocking.chattering import chattering_sequence, critical_amplitude
 
 FREQUENCIES = st.floats(math.log(0.02), math.log(200.0)).map(math.exp)
 
@@ -27,7 +27,7 @@ def test_the_bounds_are_reached_in_the_limits():
 
 
 def test_intervals_alternate_about_the_restitution_and_repeat_with_its_square():
-    intervals = sequence(1.03, 2.0, 0.92).impacts["interval"][100:160]
+    intervals = chattering_sequence(1.03, 2.0, 0.92).impacts["interval"][100:160]
     ratios = intervals[1:] / intervals[:-1]
     assert np.all((ratios[:-1] - 0.92) * (ratios[1:] - 0.92) < 0.0)
     np.testing.assert_allclose(ratios[:-1] * ratios[1:], 0.92**2, rtol=1e-4)

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from rocking.core.threads import LOOKAHEAD, map_in_threads, set_options
+from rocking.core.threads import ITEMS_AHEAD_PER_THREAD, map_in_threads, set_options
 
 
 @pytest.mark.parametrize("threads", [1, 4])
@@ -48,9 +48,9 @@ def test_items_are_taken_a_few_ahead_of_the_results():
     found = map_in_threads(lambda each: -each, items)
     with set_options(threads=2):
         assert [*itertools.islice(found, 10)] == [-each for each in range(10)]
-    assert len(taken) == 9 + 2 * LOOKAHEAD
+    assert len(taken) == 9 + 2 * ITEMS_AHEAD_PER_THREAD
     found.close()
-    assert len(taken) == 9 + 2 * LOOKAHEAD
+    assert len(taken) == 9 + 2 * ITEMS_AHEAD_PER_THREAD
 
 
 def test_whoever_leaves_early_cancels_the_work_in_hand_waits_for_it_and_leaves_the_rest():

@@ -7,7 +7,7 @@ import pytest
 
 import rocking
 from rocking import HazardCurve, Measure
-from rocking.analysis.hazard import HEADINGS
+from rocking.analysis.hazard import INTENSITY_HEADINGS
 from rocking.calibration.tables import read_observed
 from rocking.inputs import quantities
 from rocking.records import units
@@ -75,7 +75,7 @@ HEADED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("heading", HEADINGS)
+@pytest.mark.parametrize("heading", INTENSITY_HEADINGS)
 def test_an_intensity_is_the_same_in_every_column_of_hazard_curves_and_outcomes(heading, tmp_path):
     (written, per_si), measure = HEADED[heading], Measure(heading.partition("_")[0], *[1.0] * heading.startswith("sa"))
     levels, path = np.array([0.5, 1.25, 4.0]), tmp_path / "table.csv"

@@ -66,7 +66,7 @@ class BlockUnderSine:
     alpha: float = ALPHA
 
     def __post_init__(self) -> None:
-        check_lifting_amplitude(self.a, above=True)
+        check_lifting_amplitude(self.a, excludes_one=True)
         require_scalar(check_frequency(self.omega), "omega")
         require_scalar(check_lossy_restitution(self.eta), "eta")
         checks.positive(self.p, "p", OptionError, "rad/s")

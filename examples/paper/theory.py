@@ -25,11 +25,11 @@ from figure import (
 from histories import Ratios, chattering_figure, ratio_figure
 
 from rocking.chattering.duration import (
+    chattering_sequence,
     chattering_time,
     choose_impact_counts,
     critical_amplitude,
     interval_ratios,
-    sequence,
 )
 from rocking.chattering.expansions import check_lossy_restitution, first_impact_speed, first_interval, require_scalar
 from rocking.core.arrays import Floats
@@ -256,7 +256,7 @@ def figure_2(
     """Chattering oscillations from uplift to rest."""
     case = BlockUnderSine(a, omega, eta, p, alpha)
     _require_complete(case, 2)
-    chattering = sequence(a, omega, eta)
+    chattering = chattering_sequence(a, omega, eta)
     response = case.simulated("certified")
     uplift, rest = response.events["time"][:2]
     tau = dense_times(chattering.impacts["time"], chattering.time)

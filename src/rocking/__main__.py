@@ -16,9 +16,9 @@ def main() -> None:
 
         run()
     except KeyboardInterrupt:
-        from rocking.errors import INTERRUPTED
+        from rocking.errors import INTERRUPT_MESSAGE
 
-        print(INTERRUPTED, file=sys.stderr)
+        print(INTERRUPT_MESSAGE, file=sys.stderr)
         sys.exit(130)
     finally:
         # As Python ends it looks for cycles among all objects, again and again: up to a second, for memory that is

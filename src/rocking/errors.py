@@ -34,7 +34,7 @@ __all__ = [
 _PLACEHOLDER: Final = re.compile(r"\{\{\}\}|\{\}")
 
 #: Message of a command after Ctrl-C.
-INTERRUPTED: Final = "rocking: Interrupted. All files written are complete."
+INTERRUPT_MESSAGE: Final = "rocking: Interrupted. All files written are complete."
 
 #: Longest path or word that a message shows completely, in characters.
 _LONGEST_WORD: Final = 400

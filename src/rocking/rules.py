@@ -55,7 +55,7 @@ _ROTATION_SHARES: Final = np.append(np.geomspace(1e-3, 0.5, 30, endpoint=False),
 _DAMPING_FACTOR: Final = 0.34
 
 #: Relative width of the bracket of the lowest level that overturns.
-_TOLERANCE: Final = 1e-4
+_BRACKET_WIDTH: Final = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -494,10 +494,10 @@ def compare_rules(
 
 def _compute_margin(response: Response, block: Block, motion: Motion, model: Model, friction: Friction | None) -> float:
     """Compute the reciprocal of the lowest factor that overturns the block, consistent with the response."""
-    analysis = incremental_dynamic_analysis(block, motion, model=model, rtol=_TOLERANCE, friction=friction)
+    analysis = incremental_dynamic_analysis(block, motion, model=model, rtol=_BRACKET_WIDTH, friction=friction)
     margin = motion.pga / float(analysis.data.overturning_level[0, 0])
     if response.overturned:
         return float(np.fmax(margin, 1.0))  # the factor may be beyond all simulated levels
     # The level is the midpoint of a bracket. If this contains the motion itself, which stands, the change is above.
-    is_near = 1.0 <= margin <= 1.0 + _TOLERANCE and not response.unfinished
+    is_near = 1.0 <= margin <= 1.0 + _BRACKET_WIDTH and not response.unfinished
     return float(np.nextafter(1.0, 0.0)) if is_near else margin

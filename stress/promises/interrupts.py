@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 
 from promises.commands import LONG, arguments, faults, files
 from promises.promise import Found, Promise
-from rocking.errors import INTERRUPTED
+from rocking.errors import INTERRUPT_MESSAGE
 
 #: Interrupts of a part, all of one command, which has two parts.
 INTERRUPTS: Final = 20
@@ -124,7 +124,7 @@ def _judge_end(found: Found, what: str, one: Ended, folder: Path, whole: dict[st
         found.notes["over before"] += 1
     elif one.status == -signal.SIGINT:
         found.notes["before the program"] += 1  # Python itself was starting, or leaving: what it says is its own
-    elif one.status == 130 and len(lines) == 1 and lines[0] == INTERRUPTED.encode():
+    elif one.status == 130 and len(lines) == 1 and lines[0] == INTERRUPT_MESSAGE.encode():
         found.notes["interrupted"] += 1
     else:
         said = b" / ".join(lines[-3:]).decode(errors="replace")[-300:]

@@ -23,7 +23,7 @@ FOLDER = Path(__file__).resolve().parents[1]
 KEPT = 60
 
 #: Processor time after which a case is given up, s.
-BUDGET = 10.0
+STEP_BUDGET = 10.0
 
 
 class Push(NamedTuple):
@@ -89,7 +89,7 @@ def event_driven(case: Case, advance: Advance, slowest: float) -> dict[str, Any]
     side = -1 if case.is_block and x < 0.0 else 1
     u, v = (abs(x), side * v) if case.is_block else (x - case.low, v)
     t, piece, resting = 0.0, 0, False
-    latest = time.process_time() + BUDGET
+    latest = time.process_time() + STEP_BUDGET
     impacts: list[float] = []
     rests: list[float] = []
     deepest = 0.0

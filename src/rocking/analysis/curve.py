@@ -21,7 +21,7 @@ from rocking.core.arrays import Floats, Integers, unwrap_scalar
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.tables import format_within
 from rocking.errors import FitError, OptionError
-from rocking.motion.measures import DAMPING
+from rocking.motion.measures import DEFAULT_DAMPING
 from rocking.motion.scaling import Measure, check_intensities
 
 if TYPE_CHECKING:
@@ -388,8 +388,8 @@ def convert_to_openquake_measure(measure: Measure, block: Body | None, model: Mo
     if name not in ("pga", "sa"):
         known = ", ".join(["pga", "sa", *factors])
         raise OptionError(f"OpenQuake requires one of the measures {known}; got {name}", "measure", value=name)
-    if (damping := measure.damping) != DAMPING:
-        message = f"the {{}} of a spectral acceleration must be {DAMPING:g} of critical for OpenQuake; got {damping:g}"
+    if (damping := measure.damping) != DEFAULT_DAMPING:
+        message = f"the {{}} of a spectral acceleration must be {DEFAULT_DAMPING:g} of critical for OpenQuake"
         correction = "fit the fragility against a measure with this damping"
-        raise OptionError(f"{message}; {correction}", "damping", value=damping)
+        raise OptionError(f"{message}; got {damping:g}; {correction}", "damping", value=damping)
     return "PGA" if name == "pga" else f"SA({measure.period:g})", unit / STANDARD_GRAVITY

@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Points of a curve in a table or a figure.
-_POINTS: Final = 201
+_POINT_COUNT: Final = 201
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -258,9 +258,9 @@ class Fragility(Result):
 
     def _columns(self, table: str) -> list[Column]:
         if table == "curves":
-            x = np.linspace(0.0, self.intensity_range[1], _POINTS)
+            x = np.linspace(0.0, self.intensity_range[1], _POINT_COUNT)
             values = np.hstack([[x, curve.probability(x), *curve.band(x)] for curve in self.curves])
-            limit_states = np.repeat([curve.limit_state for curve in self.curves], _POINTS)
+            limit_states = np.repeat([curve.limit_state for curve in self.curves], _POINT_COUNT)
             names = ("limit_state", self.measure.column, "probability", "lower", "upper")
             return [*map(Column, names, [limit_states, *values])]
         if self.outcomes is None:
@@ -319,7 +319,7 @@ class Fragility(Result):
         band_label = f"band: {100 * first_curve.confidence:g} % confidence (likelihood)"
         if not first_curve.is_bounded:
             band_label = f"no band: {self._few_clusters_text}"
-        intensity = np.linspace(0.0, self.intensity_range[1], _POINTS)
+        intensity = np.linspace(0.0, self.intensity_range[1], _POINT_COUNT)
         limit_state = first_curve.limit_state if len(self.curves) == 1 else "the limit state"
         verb = "" if limit_state == "overturning" else "exceeding "
         return draw_fragility(
@@ -431,8 +431,8 @@ def fragility(
     table = table if "polarity" in table.dims else table.expand_dims("polarity")
     table = table.transpose("level", "motion", "block", "polarity")
     # The outcome after a loss of contact is unknown.
-    lost = table.lost_contact.values if "lost_contact" in table else np.zeros_like(table.unfinished.values)
-    missing = table.unfinished.values | lost
+    has_lost_contact = table.lost_contact.values if "lost_contact" in table else np.zeros_like(table.unfinished.values)
+    missing = table.unfinished.values | has_lost_contact
     ratio = compute_ratios(slenderness[:, None], table.peak_rotation.values, table.overturned.values, missing)
     x, trials = (np.broadcast_to(array, ratio.shape).ravel() for array in (intensity, block_weights[:, None]))
     trial_clusters = np.broadcast_to(cluster_numbers[:, None, None], ratio.shape).ravel()
@@ -475,14 +475,15 @@ def fragility(
         has_several_blocks=bool(np.count_nonzero(block_weights) > 1),
         source="motion" if clusters is None else "cluster",
         undecided=describe_undecided(setup, motions, factors, table.overturned.values),
-        missing="; ".join(filter(None, [describe_missing(table.unfinished.values), _describe_lost(lost)])),
+        missing="; ".join(filter(None, [describe_missing(table.unfinished.values), _describe_lost(has_lost_contact)])),
     )
 
 
-def _describe_lost(lost: Flags) -> str:
+def _describe_lost(has_lost_contact: Flags) -> str:
     """Describe the number of simulations that end because the ground no longer presses on the block."""
-    count = np.count_nonzero(lost)
-    return f"{count} of {lost.size} simulations ended with a loss of contact and are not counted" if count else ""
+    count = np.count_nonzero(has_lost_contact)
+    text = f"{count} of {has_lost_contact.size} simulations ended with a loss of contact and are not counted"
+    return text if count else ""
 
 
 def fit_fragility(

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rocking.plot.curves import HazardLine
 
 #: Column headings of intensities: measure and factor to SI units.
-HEADINGS: Final[dict[str, tuple[IntensityName, float]]] = {
+INTENSITY_HEADINGS: Final[dict[str, tuple[IntensityName, float]]] = {
     "pga_g": ("pga", STANDARD_GRAVITY),
     "pga_percent_g": ("pga", 0.01 * STANDARD_GRAVITY),
     "pga_m_s2": ("pga", 1.0),
@@ -243,13 +243,13 @@ def _parse_table(lines: list[str], period: float | None) -> tuple[Floats, Floats
     text = "\n".join("" if line.lstrip().startswith("#") else line for line in lines)
     (_, header), *rows = read_csv_rows(text) or [(1, [])]
     heading = [normalise_heading(cell) for cell in header]
-    intensity_headings = [cell for cell in heading if cell in HEADINGS]
+    intensity_headings = [cell for cell in heading if cell in INTENSITY_HEADINGS]
     if len(intensity_headings) != 1 or heading.count("annual_rate") != 1:
         raise OptionError(
-            f"a hazard curve requires a heading with annual_rate and one of {', '.join(HEADINGS)}; "
+            f"a hazard curve requires a heading with annual_rate and one of {', '.join(INTENSITY_HEADINGS)}; "
             f"got {', '.join(header) or 'nothing'}"
         )
-    kind, factor = HEADINGS[intensity_headings[0]]
+    kind, factor = INTENSITY_HEADINGS[intensity_headings[0]]
     intensity, rate = np.empty((2, len(rows)))
     for k, (line, row) in enumerate(rows):
         try:

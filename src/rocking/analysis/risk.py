@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Probabilities of exceedance for the intensities in the table of a survival, and for the limits of its figure.
-_PROBABILITIES: Final = (0.05, 0.16, 0.5, 0.84, 0.95)
+_DRAWN_PROBABILITIES: Final = (0.05, 0.16, 0.5, 0.84, 0.95)
 _FIGURE_RANGE: Final = (0.01, 0.999)
 
 
@@ -233,9 +233,9 @@ def describe_extrapolated_shares(rate: Rate) -> list[str]:
     ]
 
 
-def check_measure(hazard: HazardCurve, measure: Measure) -> None:
+def check_measure(hazard: HazardCurve | None, measure: Measure) -> None:
     """Raise an OptionError if the measures of a hazard curve and a fragility differ."""
-    if measure != hazard.measure:
+    if hazard is not None and measure != hazard.measure:
         raise OptionError(
             f"the fragility and the hazard curve must have the same measure; got {measure.label} and "
             f"{hazard.measure.label}; fit the fragility against the measure of the hazard curve"
@@ -316,7 +316,7 @@ class Survival(Result):
     @property
     def intensity(self) -> Floats:
         """Intensities (SI) that exceed the limit with probabilities of 0.05, 0.16, 0.5, 0.84 and 0.95."""
-        return np.array([self.curve.intensity_of(probability) for probability in _PROBABILITIES])
+        return np.array([self.curve.intensity_of(probability) for probability in _DRAWN_PROBABILITIES])
 
     @property
     def never_reached_intensity(self) -> float:
@@ -375,7 +375,7 @@ class Survival(Result):
         factor, data_range = measure.display_factor, self._known_range
         columns: list[list[Any]] = [
             [format_within(x, data_range, lambda end: f"{factor * end:.5g}") for x in self.intensity],
-            [*_PROBABILITIES],
+            [*_DRAWN_PROBABILITIES],
             [f"{rate:.2g}" for rate in self.largest_rate],
             [f"{float(f'{1.0 / rate:.2g}'):.7g}" for rate in self.largest_rate],
         ]
@@ -386,7 +386,7 @@ class Survival(Result):
             resolved = np.where(rates < lowest, 0.0, np.minimum(rates, highest))
             columns += [
                 [format_within(rate, (lowest, highest), "{:.2g}".format) for rate in rates],
-                [f"{probability:.2g}" for probability in np.exp(-self.years * resolved * _PROBABILITIES)],
+                [f"{probability:.2g}" for probability in np.exp(-self.years * resolved * _DRAWN_PROBABILITIES)],
             ]
         lines = [
             f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; intensity: {measure.label}",
@@ -445,7 +445,7 @@ class Survival(Result):
             "years": self.years,
             "confidence": self.confidence,
             f"most_likely_never_{column}": self.never_reached_intensity,
-            "probability_of_exceedance": [*_PROBABILITIES],
+            "probability_of_exceedance": [*_DRAWN_PROBABILITIES],
             column: self.intensity,
             "largest_annual_rate": self.largest_rate,
         }

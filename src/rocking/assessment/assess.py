@@ -127,8 +127,7 @@ def assess(
     if isinstance(levels, int):
         checks.integer(levels, "levels", OptionError, 2)
     intensity = Measure.parse(measure)
-    if hazard is not None:
-        check_measure(hazard, intensity)
+    check_measure(hazard, intensity)
     named, unusable = index_motions(motions), dict[str, str]()
     failed = dict(blocks.failures) if isinstance(blocks, Inventory) else {}
     is_usable = [_check_intensity(name, motion, intensity, unusable) for name, motion in named.items()]
@@ -214,11 +213,11 @@ class _Study:
         measure, model = self.measure, options["model"]
         values = compute_intensities(self.motions, measure)
         lowest = compute_lowest_uplift(blocks, self.motions, values, measure, model)
-        strongest = np.median(
-            [_MAX_PGA * value / motion.pga for value, motion in zip(values, self.motions, strict=True)]
-        )
+        power, pgas = measure.exponent, np.array([motion.pga for motion in self.motions])
+        strongest = float(np.median(values * (_MAX_PGA / pgas) ** power))
         unit = float(compute_block_units(blocks, measure, model).min())
-        search = np.geomspace(lowest, min(max(2.0 * lowest, strongest / unit), 64.0 * lowest), _SEARCH_COUNT)
+        highest = min(max(2.0**power * lowest, strongest / unit), 64.0**power * lowest)
+        search = np.geomspace(lowest, highest, _SEARCH_COUNT)
         table = simulate_levels(blocks, self.motions, measure, search, **{**options, "polarity": "+"})
         shares = table.overturned.mean([name for name in table.overturned.dims if name != "level"]).values
         first, last = int(np.argmax(shares > 0.0)), int(np.argmax(shares >= _LAST_SHARE))

@@ -30,28 +30,21 @@ class Chart:
         self.x, self.y, self.parts = x, y, list[str]()
         for tick in list_ticks(*x):
             position = float(self._place_x(np.array(tick)))
-            self._add_line(position, _TOP, position, _HEIGHT - _BOTTOM, "grid")
-            self._add_text(position, _HEIGHT - _BOTTOM + 15.0, f"{tick:g}", "middle")
+            self.parts.append(_draw_line("grid", position, _TOP, position, _HEIGHT - _BOTTOM))
+            self.parts.append(_draw_text(position, _HEIGHT - _BOTTOM + 15.0, f"{tick:g}"))
         for tick in list_ticks(*y, 4):
             position = float(self._place_y(np.array(tick)))
-            self._add_line(_LEFT, position, _WIDTH - _RIGHT, position, "grid")
-            self._add_text(_LEFT - 6.0, position + 4.0, f"{tick:g}", "end")
-        self._add_text(0.5 * (_LEFT + _WIDTH), _HEIGHT - 5.0, x_label, "middle")
+            self.parts.append(_draw_line("grid", _LEFT, position, _WIDTH - _RIGHT, position))
+            self.parts.append(_draw_text(_LEFT - 6.0, position + 4.0, f"{tick:g}", "end"))
         middle = 0.5 * (_TOP + _HEIGHT - _BOTTOM)
-        turn = f' transform="rotate(-90 12 {middle:.0f})"'
-        self.parts.append(f'<text x="12" y="{middle:.0f}" text-anchor="middle"{turn}>{escape(y_label)}</text>')
+        self.parts.append(_draw_text(0.5 * (_LEFT + _WIDTH), _HEIGHT - 5.0, x_label))
+        self.parts.append(f'<g transform="rotate(-90 12 {middle:.0f})">{_draw_text(12.0, middle, y_label)}</g>')
 
     def _place_x(self, values: Floats) -> Floats:
         return _LEFT + (values - self.x[0]) / (self.x[1] - self.x[0]) * (_WIDTH - _LEFT - _RIGHT)
 
     def _place_y(self, values: Floats) -> Floats:
         return _HEIGHT - _BOTTOM - (values - self.y[0]) / (self.y[1] - self.y[0]) * (_HEIGHT - _TOP - _BOTTOM)
-
-    def _add_line(self, x1: float, y1: float, x2: float, y2: float, kind: str) -> None:
-        self.parts.append(f'<line class="{kind}" x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}"/>')
-
-    def _add_text(self, x: float, y: float, text: str, anchor: str) -> None:
-        self.parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(text)}</text>')
 
     def _write_points(self, x: Floats, y: Floats) -> str:
         return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(self._place_x(x), self._place_y(y), strict=True))
@@ -75,50 +68,49 @@ class Chart:
         frame = f'<path class="axis" d="M{_LEFT},{_TOP}V{_HEIGHT - _BOTTOM}H{_WIDTH - _RIGHT}"/>'
         return _wrap(_WIDTH, _HEIGHT, [*self.parts, frame])
 
-    @staticmethod
-    def draw_bar(interval: tuple[float, float], mark: float, longest: float, *, has_end: bool) -> str:
-        """Return a bar between two numbers, with an arrow without an upper end, and a triangle at a mark."""
-        width, height = 150.0, 8.0
-        low, high, at = (width * min(value / longest, 1.0) for value in (*interval, mark))
-        parts = [f'<line class="grid" x1="0" y1="{height / 2}" x2="{width}" y2="{height / 2}"/>']
-        if has_end:
-            end = max(high, low + 1.5)
-            parts.append(f'<line class="bar" x1="{low:.1f}" y1="{height / 2}" x2="{end:.1f}" y2="{height / 2}"/>')
-        else:
-            parts.append(f'<path class="point" d="M{low - 6:.1f},1l6,3l-6,3z"/>')
-        parts.append(f'<path class="now" d="M{at:.1f},{height / 2}l-3,4h6z"/>')
-        return _wrap(width, height, parts)
 
-    @staticmethod
-    def draw_intervals(rows: Sequence[tuple[str, float, float, float]], ends: tuple[float, float], label: str) -> str:
-        """Return named intervals (low, middle, high) on one logarithmic axis."""
-        left, step = 200.0, 17.0
-        height = step * len(rows) + 40.0
-        low, high = math.log(ends[0] / 1.15), math.log(ends[1] * 1.15)
+def draw_bar(interval: tuple[float, float], mark: float, longest: float, *, has_end: bool) -> str:
+    """Return a bar between two numbers, with an arrow without an upper end, and a triangle at a mark."""
+    width, height = 150.0, 8.0
+    low, high, at = (width * min(value / longest, 1.0) for value in (*interval, mark))
+    parts = [_draw_line("grid", 0.0, 4.0, width, 4.0)]
+    arrow = f'<path class="point" d="M{low - 6:.1f},1l6,3l-6,3z"/>'
+    parts.append(_draw_line("bar", low, 4.0, max(high, low + 1.5), 4.0) if has_end else arrow)
+    parts.append(f'<path class="now" d="M{at:.1f},4l-3,4h6z"/>')
+    return _wrap(width, height, parts)
 
-        def place(value: float) -> float:
-            return left + (math.log(value) - low) / (high - low) * (_WIDTH - left - _RIGHT)
 
-        parts = list[str]()
-        for tick in list_log_ticks(math.exp(low), math.exp(high)):
-            x = place(tick)
-            parts.append(f'<line class="grid" x1="{x:.1f}" y1="0" x2="{x:.1f}" y2="{height - 38:.1f}"/>')
-            parts.append(f'<text x="{x:.1f}" y="{height - 24:.1f}" text-anchor="middle">{tick:g}</text>')
-        parts.append(
-            f'<text x="{0.5 * (left + _WIDTH):.1f}" y="{height - 6:.1f}" text-anchor="middle">{escape(label)}</text>'
-        )
-        for k, (name, start, middle, end) in enumerate(rows):
-            y = step * (k + 0.5)
-            a = place(start) if start > 0.0 else left
-            b = place(end) if end < math.inf else _WIDTH - _RIGHT
-            short = name if len(name) <= 32 else f"{name[:31]}…"
-            parts.append(f'<text x="{left - 8:.1f}" y="{y + 4:.1f}" text-anchor="end">{escape(short)}</text>')
-            parts.append(f'<line class="bar" x1="{a:.1f}" y1="{y:.1f}" x2="{b:.1f}" y2="{y:.1f}"/>')
-            if math.isinf(end):
-                parts.append(f'<path class="point" d="M{b:.1f},{y - 5:.1f}l8,5l-8,5z"/>')
-            if not math.isnan(middle):
-                parts.append(f'<circle class="point" cx="{place(middle):.1f}" cy="{y:.1f}" r="4"/>')
-        return _wrap(_WIDTH, height, parts)
+def draw_intervals(rows: Sequence[tuple[str, float, float, float]], ends: tuple[float, float], label: str) -> str:
+    """Return named intervals (low, middle, high) on one logarithmic axis."""
+    left, step = 200.0, 17.0
+    height = step * len(rows) + 40.0
+    low, high = math.log(ends[0] / 1.15), math.log(ends[1] * 1.15)
+
+    def place(value: float) -> float:
+        share = (math.log(value) - low) / (high - low) if 0.0 < value < math.inf else float(value > 0.0)
+        return left + share * (_WIDTH - left - _RIGHT)
+
+    parts = [_draw_text(0.5 * (left + _WIDTH), height - 6.0, label)]
+    for tick in list_log_ticks(math.exp(low), math.exp(high)):
+        parts.append(_draw_line("grid", place(tick), 0.0, place(tick), height - 38.0))
+        parts.append(_draw_text(place(tick), height - 24.0, f"{tick:g}"))
+    for k, (name, start, middle, end) in enumerate(rows):
+        y = step * (k + 0.5)
+        parts.append(_draw_text(left - 8.0, y + 4.0, name if len(name) <= 32 else f"{name[:31]}…", "end"))
+        parts.append(_draw_line("bar", place(start), y, place(end), y))
+        if math.isinf(end):
+            parts.append(f'<path class="point" d="M{place(end):.1f},{y - 5:.1f}l8,5l-8,5z"/>')
+        if not math.isnan(middle):
+            parts.append(f'<circle class="point" cx="{place(middle):.1f}" cy="{y:.1f}" r="4"/>')
+    return _wrap(_WIDTH, height, parts)
+
+
+def _draw_line(kind: str, x1: float, y1: float, x2: float, y2: float) -> str:
+    return f'<line class="{kind}" x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}"/>'
+
+
+def _draw_text(x: float, y: float, text: str, anchor: str = "middle") -> str:
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(text)}</text>'
 
 
 def _wrap(width: float, height: float, parts: Sequence[str]) -> str:

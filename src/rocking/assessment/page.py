@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from rocking.analysis.levels import compute_block_units
 from rocking.analysis.risk import describe_extrapolated_shares
-from rocking.assessment.chart import Chart
+from rocking.assessment.chart import Chart, draw_bar, draw_intervals
 from rocking.core.constants import STANDARD_GRAVITY, VERSION
-from rocking.core.tables import format_count, write_text
+from rocking.core.tables import format_count, list_some, write_text
+from rocking.engine.problem import gather_bodies
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,9 +27,6 @@ if TYPE_CHECKING:
 
 #: Rules of thumb beside the simulations.
 RULES: Final = ("west", "ishiyama")
-
-#: Maximum number of names in a sentence.
-_MAX_NAMES: Final = 5
 
 
 def write_page(assessment: Assessment, path: str | Path, command: str) -> None:
@@ -99,7 +98,7 @@ def _write_object(assessment: Assessment, k: int) -> str:
             f'<b class="overturns">{outcome}</b>' if outcome == "overturns" else outcome,
             "" if math.isinf(peak) else f"{peak:.2f}",
             f"&gt; {low:.2g}" if math.isinf(high) else f"{low:.2g} to {high:.2g}",
-            Chart.draw_bar((low, min(high, longest)), recorded, longest, has_end=high < math.inf),
+            draw_bar((low, min(high, longest)), recorded, longest, has_end=high < math.inf),
         ]
         rows.append(row + [f"{float(data[rule].values[k, m]):.2f}" for rule in rules])
     statements = "".join(f"<li>{escape(text)}</li>" for text in describe_object(assessment, k))
@@ -132,13 +131,11 @@ def describe_object(assessment: Assessment, k: int) -> list[str]:
     item, data, measure = assessment.objects[k], assessment.data, assessment.measure
     names = np.array(_shorten_names(assessment.motions))
     overturned, total = data.overturned.values[k], len(names)
-    listed = _list_names(names[overturned])
+    listed = f" ({list_some(names[overturned].tolist())})" if overturned.any() else ""
     text = f"Under the records as they are it overturns in {overturned.sum()} of {total}{listed}"
     undecided = data.undecided.values[k]
     if undecided.any():
-        text += (
-            f"; {undecided.sum()} of the {total} outcomes are undecided, because they change within 3e-6 of the motion"
-        )
+        text += f"; {undecided.sum()} outcomes are undecided, because they change within 3e-6 of the motion"
     statements = [f"{text}."]
     scale, unit = measure.display_factor, f" {measure.display_unit}".rstrip()
     low, high = item.first_levels
@@ -163,18 +160,15 @@ def describe_object(assessment: Assessment, k: int) -> list[str]:
         statements.append(f"{text}from {simulations}.")
     statements += _describe_rate(assessment, item)
     if item.samples > 1:
-        statements.append(
-            f"Its size is uncertain: the curve is of {item.samples} sampled sizes; records have the mean."
-        )
+        statements.append(f"Its size is uncertain: the curve is of {item.samples} sampled sizes, records of the mean.")
     statements += _describe_sliding(item, data, k)
     for rule in RULES:
         ratios = data[rule].values[k]
         if np.isfinite(ratios).all():
             right = int(np.count_nonzero((ratios >= 1.0) == overturned))
             unsafe = int(np.count_nonzero((ratios < 1.0) & overturned))
-            statements.append(
-                f"The rule {rule.title()} is right for {right} of {total} records, and unsafe for {unsafe}."
-            )
+            verdict = f"is right for {right} of {total} records, and unsafe for {unsafe}"
+            statements.append(f"The rule {rule.title()} {verdict}.")
     notes = []
     if item.fragility is not None and item.curve is not None:
         has_ends = item.curve.is_bounded and not math.isinf(item.curve.dispersion_interval[1])
@@ -191,20 +185,16 @@ def _describe_rate(assessment: Assessment, item: ObjectAssessment) -> list[str]:
     period, interval, probability = assessment.format_rate(item)
     if item.rate is None:
         return [f"It overturns once in {period} years, because the outcomes only bound the rate."]
-    text = (
-        f"At the site it overturns once in {period} years (interval {interval}), and within {years} with probability "
-    )
-    return [f"{text}{probability}.", *(f"{share}." for share in describe_extrapolated_shares(item.rate))]
+    text = f"At the site it overturns once in {period} years (interval {interval}), and within {years} with probability"
+    return [f"{text} {probability}.", *(f"{share}." for share in describe_extrapolated_shares(item.rate))]
 
 
 def _describe_sliding(item: ObjectAssessment, data: xr.Dataset, k: int) -> list[str]:
     """Describe the friction that an object requires, or its slip."""
     threshold = item.uplift / item.body.gravity
     if item.friction is None:
-        text = (
-            f"It lifts off at {threshold:.3g} g. With a coefficient of friction below {threshold:.3g} it would slide "
-        )
-        return [text + "instead of rock; the simulations do not include sliding."]
+        text = f"It lifts off at {threshold:.3g} g. With a coefficient of friction below {threshold:.3g} it would slide"
+        return [f"{text} instead of rock; the simulations do not include sliding."]
     text = f"With a coefficient of friction of {item.static_friction:g} it "
     slip = np.nanmax(data.largest_slip.values[k]) if "largest_slip" in data else math.nan
     slides = f"slides by up to {1000.0 * slip:.2g} mm under the records as they are" if slip > 0.0 else "does not slide"
@@ -218,13 +208,6 @@ def _shorten_names(names: Iterable[str]) -> list[str]:
     long_names = [*names]
     short_names = [Path(name).name for name in long_names]
     return short_names if len({*short_names}) == len(long_names) else long_names
-
-
-def _list_names(names: Sequence[str]) -> str:
-    if not len(names):
-        return ""
-    more = f" and {len(names) - _MAX_NAMES} more" if len(names) > _MAX_NAMES else ""
-    return f" ({', '.join(names[:_MAX_NAMES])}{more})"
 
 
 def _write_records(assessment: Assessment) -> str:
@@ -257,9 +240,14 @@ def _write_method(assessment: Assessment, command: str) -> str:
     versions = [f"rocking {VERSION}", f"Python {platform.python_version()}"]
     versions += [f"{name} {metadata.version(name)}" for name in ("numpy", "scipy")]
     polarity = {"both": "Original and reversed motions", "+": "Original motions", "-": "Reversed motions"}
-    model = f"Rigid blocks, {assessment.model} model, events located and chattering certified."
+    measure, values = assessment.measure, assessment.data[assessment.measure.name].values
+    units = compute_block_units(gather_bodies([item.body for item in assessment.objects]), measure, assessment.model)
+    ends = [unit * item.levels[[0, -1], None] for unit, item in zip(units, assessment.objects, strict=True)]
+    low, high = (fold(measure.find_factor(np.array(ends), values)) for fold in (np.min, np.max))
     assumptions = [
-        model,
+        f"Rigid blocks, {assessment.model} model, events located and chattering certified.",
+        f"The levels scale the records by factors of {low:.2g} to {high:.2g}. Scaled weak motions differ from strong "
+        "ones in duration and frequency content.",
         f"{polarity[options['polarity']]}; a symmetric object responds equally to both, which count once.",
         "Fragility: lognormal curve by maximum likelihood; motions are independent, unless they were grouped.",
         "An undecided outcome changes if the motion is scaled by less than 3e-6.",
@@ -284,11 +272,11 @@ def _draw_overview(assessment: Assessment) -> str:
             median, (low, high) = curve.median, curve.median_interval
         rows.append((f"{k + 1}. {item.name}", scale * low, scale * median, scale * high))
         ends += [end for end in rows[-1][1:] if 0.0 < end < math.inf]
-    return Chart.draw_intervals(rows, (min(ends), max(ends)), assessment.measure.label)
+    return draw_intervals(rows, (min(ends), max(ends)), assessment.measure.label)
 
 
 def _draw_fragility(assessment: Assessment, item: ObjectAssessment) -> str:
-    """Draw the fragility curve with its band and the simulated shares, and the hazard curve."""
+    """Draw the fragility curve with its band and the simulated shares."""
     scale = assessment.measure.display_factor
     chart = Chart(
         (0.0, 1.05 * scale * item.levels[-1]), (0.0, 1.0), assessment.measure.label, "probability of overturning"

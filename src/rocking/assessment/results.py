@@ -20,7 +20,15 @@ from rocking.block.friction import Friction, resolve_friction
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.core.result import Result
-from rocking.core.tables import Column, dataset_to_columns, format_count, format_digits, format_table, write_netcdf
+from rocking.core.tables import (
+    Column,
+    dataset_to_columns,
+    format_count,
+    format_digits,
+    format_reasons,
+    format_table,
+    write_netcdf,
+)
 from rocking.engine.problem import compute_slenderness, gather_bodies
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
@@ -188,7 +196,7 @@ class Assessment(Result):
         header, rows = self.tabulate()
         lines = [self._headline(), "", format_table(header, rows)]
         lines += [f"not assessed: {name}: {reason}" for name, reason in self.failures.items()]
-        lines += [f"not used: {name}: {reason}" for name, reason in self.skipped.items()]
+        lines += [f"not used: {text}" for text in format_reasons(self.skipped)]
         return "\n".join(lines)
 
     @property

@@ -22,17 +22,17 @@ from rocking.core.tables import format_cell, format_range
 from rocking.errors import BlockError, escape_braces
 from rocking.kernels import state
 
-_FIELDS: Final = ("p", "alpha", "restitution")
+_PARAMETER_NAMES: Final = ("p", "alpha", "restitution")
 
 #: Terms of restraints on each side with their default values, and `one_sided`.
-_TERMS: Final = {**RestraintTerms()._asdict(), "one_sided": 0.0}
+_TERM_DEFAULTS: Final = {**RestraintTerms()._asdict(), "one_sided": 0.0}
 _UNITS: Final = {
     "p": "rad/s", "alpha": "rad", "damping": "1/s", "lever_arm": "m", "stiffness": "1/m", "yield_elongation": "m",
     "slack_elongation": "m", "restitution_slope": "s/rad",
 }  # fmt: skip
 
 #: Exponents of the factor on p in the terms of a resized block; other terms do not change.
-_EXPONENTS: Final = {
+_SIZE_EXPONENTS: Final = {
     "damping": 1, "stiffness": 2, "lever_arm": -2, "yield_elongation": -2, "slack_elongation": -2,
     "restitution_slope": -1,
 }  # fmt: skip
@@ -105,18 +105,18 @@ class Blocks:
         if restitution is not None:
             arguments["restitution"] = restitution
         if terms:
-            arguments |= {**_TERMS, **terms}
-            if unknown := [*terms.keys() - _TERMS.keys()]:
-                message = f"blocks have no parameter {{}}; the terms of restraints are {', '.join(_TERMS)}"
+            arguments |= {**_TERM_DEFAULTS, **terms}
+            if unknown := [*terms.keys() - _TERM_DEFAULTS.keys()]:
+                message = f"blocks have no parameter {{}}; the terms of restraints are {', '.join(_TERM_DEFAULTS)}"
                 raise BlockError(message, unknown[0])
         try:
             columns = [_expand_sides(checks.numbers(values, name, BlockError)) for name, values in arguments.items()]
             arrays = dict(zip(arguments, np.broadcast_arrays(*columns), strict=True))
         except ValueError:
             message = "{}, {} and {} must be numbers, or arrays of shape (n,) or (n, 2) with the same n"
-            raise BlockError(message, *_FIELDS) from None
+            raise BlockError(message, *_PARAMETER_NAMES) from None
         g = check_gravity(gravity)
-        for name in _FIELDS if restitution is not None else _FIELDS[:2]:
+        for name in _PARAMETER_NAMES if restitution is not None else _PARAMETER_NAMES[:2]:
             check_sides(arrays[name], name)
         if restitution is None:
             arrays["restitution"] = _compute_restitutions(arrays["p"], arrays["alpha"])
@@ -134,8 +134,8 @@ class Blocks:
         columns = {name: np.ascontiguousarray(values) for name, values in arrays.items()}
         for values in columns.values():
             values.flags.writeable = False
-        self.__dict__.update({name: columns.pop(name) for name in _FIELDS}, gravity=gravity, terms=columns, axes=axes)
-        self.__dict__.update(radii=radii, labels=labels or {})
+        self.__dict__.update({name: columns.pop(name) for name in _PARAMETER_NAMES})
+        self.__dict__.update(gravity=gravity, terms=columns, axes=axes, radii=radii, labels=labels or {})
         return self
 
     @classmethod
@@ -287,10 +287,11 @@ class Blocks:
             message = "Blocks.from_bodies requires at least one block, and the same {} for all of them"
             raise BlockError(message, "gravity")
         rows = [body._create_rows() for body in bodies]
-        if max(len(sides[0]) for sides in rows) > len(_FIELDS):
-            rows = [[(*side, *[*_TERMS.values()][len(side) - len(_FIELDS) :]) for side in sides] for sides in rows]
+        if max(len(sides[0]) for sides in rows) > len(_PARAMETER_NAMES):
+            defaults, count = [*_TERM_DEFAULTS.values()], len(_PARAMETER_NAMES)
+            rows = [[(*side, *defaults[len(side) - count :]) for side in sides] for sides in rows]
         table = np.array(rows).transpose(2, 0, 1)
-        names = (*_FIELDS, *_TERMS)[: len(table)]
+        names = (*_PARAMETER_NAMES, *_TERM_DEFAULTS)[: len(table)]
         radii = np.array([body._list_radii() for body in bodies])
         labels = {
             name: _collect_label(bodies, name) for name in dict.fromkeys(n for body in bodies for n in body.labels)
@@ -445,7 +446,7 @@ class Blocks:
         tendon prestress, strength, and stiffness times length, so its yield strain is unchanged.
         """
         scale = factors[:, None]
-        terms = {name: values * scale ** _EXPONENTS.get(name, 0) for name, values in self.terms.items()}
+        terms = {name: values * scale ** _SIZE_EXPONENTS.get(name, 0) for name, values in self.terms.items()}
         blocks = Blocks(self.p * scale, self.alpha, self.restitution, gravity=self.gravity, **terms)
         blocks.__dict__.update(radii=None if self.radii is None else self.radii / scale**2, labels=self.labels)
         return blocks

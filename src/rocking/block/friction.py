@@ -81,7 +81,7 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
         inertia[:, ::-1] - height**2 - base[:, ::-1] ** 2
     )  # of the radius of gyration, by the side entered
     static, kinetic = friction
-    _raise_if_any(~((ratio < 1.0) & (gyration_squared > 0.0)), _MISSING)
+    _raise_if_any(~((ratio < 1.0) & (gyration_squared > 0.0)), _NEEDS_SIZES)
     centroidal_inertia = (1.0 - ratio) / ratio
     pivot_square = gyration_squared + base[:, ::-1] ** 2
     largest = np.minimum(
@@ -135,16 +135,16 @@ def _find_radii(blocks: Blocks) -> Floats:
             return radii
         depth = np.full(len(blocks), np.inf)
         depth[differs] = compute_rigid_bodies(blocks.p[differs], blocks.alpha[differs])[1]
-        _raise_if_any(np.isnan(depth), _MISSING)
+        _raise_if_any(np.isnan(depth), _NEEDS_SIZES)
         radii[differs] = blocks.gravity * depth[differs, None] / np.cos(blocks.alpha[differs])
     heights = radii * np.cos(blocks.alpha)
     squares = blocks.gravity * radii / blocks.p**2 - radii**2
     for sizes in (heights, squares):
-        _raise_if_any(np.abs(sizes[:, 0] - sizes[:, 1]) > _SIZE_TOLERANCE * np.abs(sizes[:, 0]), _MISSING)
+        _raise_if_any(np.abs(sizes[:, 0] - sizes[:, 1]) > _SIZE_TOLERANCE * np.abs(sizes[:, 0]), _NEEDS_SIZES)
     return radii
 
 
-_MISSING: Final = (
+_NEEDS_SIZES: Final = (
     "{} requires the sizes of a rigid body, and none has the p and alpha of both sides; create the block with "
     "Block.from_pivots"
 )

@@ -44,7 +44,7 @@ _START_COUNT: Final = 2048
 
 #: Successive shares of the history to fit, and number of best fits that continue. Over the whole history the misfit has
 #: many local minima because impacts drift out of phase, over the first arcs few.
-_STAGES: Final = ((0.15, 16), (0.3, 8), (0.6, 4), (1.0, 2))
+_FIT_STAGES: Final = ((0.15, 16), (0.3, 8), (0.6, 4), (1.0, 2))
 
 #: Number of points then tried around the optimum, and widths of the clouds in standard errors.
 _CLOUD_SIZE: Final = 64
@@ -383,8 +383,8 @@ def _fit(problem: _Problem, rng: np.random.Generator) -> Floats:
     low, high = problem.bounds
     survivors = qmc.scale(qmc.Halton(len(low), rng=rng).random(_START_COUNT), low, high)
     sample_count = len(problem.times)
-    with Progress("fitting", sum(survivor_count for _, survivor_count in _STAGES) + len(_CLOUD_WIDTHS)) as bar:
-        for share, survivor_count in _STAGES:
+    with Progress("fitting", sum(survivor_count for _, survivor_count in _FIT_STAGES) + len(_CLOUD_WIDTHS)) as bar:
+        for share, survivor_count in _FIT_STAGES:
             count = min(max(problem.count_samples(share), 2 * len(low)), sample_count)
             errors = [problem.compute_squared_error(logs, count) for logs in survivors]
             optima = []

@@ -214,7 +214,7 @@ RUN_COUNT: Final = 2
 #: Equal parts of a run's candidates: two that fill the space, then one for each exponent of the likelihood. The
 #: search continues at most `_MAX_EXTENSIONS` times if runs disagree or too few candidates are effective.
 _FILLING_PARTS: Final = 2
-_EXPONENTS: Final = (0.03, 0.1, 0.3, 1.0, 1.0)
+_ANNEALING_EXPONENTS: Final = (0.03, 0.1, 0.3, 1.0, 1.0)
 _MAX_EXTENSIONS: Final = 2
 
 #: Draws from a posterior, and rounds of moves after each tempering step, for the search and the comparison.
@@ -275,10 +275,10 @@ class SearchResult:
 
 def search(problem: Problem, candidates: int, rng: Generator) -> SearchResult:
     """Simulate about this many candidates, up to twice as many while runs disagree or few represent the posterior."""
-    part_size = max(candidates // (RUN_COUNT * (_FILLING_PARTS + len(_EXPONENTS))), 1)
+    part_size = max(candidates // (RUN_COUNT * (_FILLING_PARTS + len(_ANNEALING_EXPONENTS))), 1)
     streams = rng.spawn(RUN_COUNT)
     runs: Sequence[Candidates] = [problem.fill_space(_FILLING_PARTS * part_size, stream) for stream in streams]
-    result = _extend_runs(problem, runs, _EXPONENTS, part_size, streams)
+    result = _extend_runs(problem, runs, _ANNEALING_EXPONENTS, part_size, streams)
     for _ in range(_MAX_EXTENSIONS):
         if max(result.agreement.values()) >= MAX_R_HAT:
             exponents = 0.1, 0.3, 1.0

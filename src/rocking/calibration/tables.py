@@ -10,7 +10,7 @@ from typing import Any, Final, get_args
 
 import numpy as np
 
-from rocking.analysis.hazard import HEADINGS, normalise_heading
+from rocking.analysis.hazard import INTENSITY_HEADINGS, normalise_heading
 from rocking.analysis.levels import assign_families
 from rocking.block import Blocks
 from rocking.calibration.validate import ShakeTest
@@ -240,15 +240,15 @@ def read_tests(
 def read_observed(path: Path, measure: Measure, **options: Any) -> dict[str, Any]:
     """Read a table of observed outcomes as arguments of `fit_fragility`.
 
-    The table has a column "overturned" (a count with a column "trials"), and either an intensity (`HEADINGS`) or a
-    motion (see `read_tests`). Column "group" labels outcomes that belong together. Outcomes under one motion, and
+    The table has a column "overturned" (a count with a column "trials"), and either an intensity (`INTENSITY_HEADINGS`)
+    or a motion (see `read_tests`). Column "group" labels outcomes that belong together. Outcomes under one motion, and
     groups with a common motion, always do. A row without label belongs to no group. Options apply to the files.
     """
     table = read_table(path, normalise_heading)
     columns = table.columns
-    intensities = [name for name in columns if name in HEADINGS]
+    intensities = [name for name in columns if name in INTENSITY_HEADINGS]
     if "overturned" not in columns or len(intensities) + ("motion" in columns) != 1:
-        expected = f"overturned and either motion or one of {', '.join(HEADINGS)}"
+        expected = f"overturned and either motion or one of {', '.join(INTENSITY_HEADINGS)}"
         raise table.create_error(f"the columns must be {expected}, not {','.join(columns)}")
     has_trials = "trials" in columns
     observed: dict[str, Any] = {
@@ -265,7 +265,7 @@ def read_observed(path: Path, measure: Measure, **options: Any) -> dict[str, Any
 
 
 def _pair_with_intensity(table: _Table, heading: str, measure: Measure) -> dict[str, Any]:
-    kind, factor = HEADINGS[heading]
+    kind, factor = INTENSITY_HEADINGS[heading]
     if kind == "sa" and measure.period is None:
         raise OptionError("a spectral acceleration requires {}, in s", "period", path=str(table.path))
     if measure.name not in ("pga", kind):  # "pga" is the default

@@ -1,12 +1,12 @@
 from . import families
 from .duration import (
     ChatteringSequence,
+    chattering_sequence,
     chattering_time,
     critical_amplitude,
     critical_amplitude_nonlinear,
     interval_ratios,
     is_complete,
-    sequence,
 )
 from .expansions import asymptotic_table, first_impact_speed, first_interval, series_coefficients
 from .maps import ChatteringEpisodes, ChatteringMap, UpliftOutcome, chattering_episodes, chattering_map
@@ -23,6 +23,7 @@ __all__ = [
     "chattering_episodes",
     "chattering_map",
     "chattering_report",
+    "chattering_sequence",
     "chattering_time",
     "critical_amplitude",
     "critical_amplitude_nonlinear",
@@ -32,6 +33,5 @@ __all__ = [
     "first_interval",
     "interval_ratios",
     "is_complete",
-    "sequence",
     "series_coefficients",
 ]

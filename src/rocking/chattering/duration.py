@@ -103,7 +103,7 @@ def chattering_time(
     --------
     is_complete : Determine whether chattering is complete.
     critical_amplitude : Compute the largest amplitude with complete chattering.
-    sequence : Resolve one sequence impact by impact.
+    chattering_sequence : Resolve one sequence impact by impact.
 
     Notes
     -----
@@ -176,12 +176,12 @@ class ChatteringSequence:
 
     See Also
     --------
-    sequence : Resolve one sequence impact by impact.
+    chattering_sequence : Resolve one sequence impact by impact.
 
     Examples
     --------
     >>> from rocking import chattering
-    >>> sequence = chattering.sequence(1.03, 2.0, 0.92)
+    >>> sequence = chattering.chattering_sequence(1.03, 2.0, 0.92)
     >>> f"rest at {sequence.time:.6f}, complete: {sequence.is_complete}"
     'rest at 1.125948, complete: True'
     """
@@ -197,7 +197,7 @@ class ChatteringSequence:
         return f"<ChatteringSequence: {format_count(len(self.impacts), 'impact')} resolved; {end}>"
 
 
-def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) -> ChatteringSequence:
+def chattering_sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) -> ChatteringSequence:
     """Resolve one sequence impact by impact (paper, Eqs 6, 13, 15 and 20) until its time of rest is bracketed.
 
     Parameters
@@ -219,7 +219,7 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
 
     Examples
     --------
-    >>> chattering = sequence(1.03, 2.0, 0.92)
+    >>> chattering = chattering_sequence(1.03, 2.0, 0.92)
     >>> chattering.is_complete, chattering.impacts["side"][:3].tolist()
     (True, [1, -1, 1])
     """
@@ -269,7 +269,7 @@ def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
 
     See Also
     --------
-    sequence : Resolve one sequence impact by impact.
+    chattering_sequence : Resolve one sequence impact by impact.
 
     Examples
     --------

@@ -84,11 +84,11 @@ def require_scalar(values: Floats, name: str) -> float:
     return float(values)
 
 
-def check_lifting_amplitude(a: ArrayLike, *, above: bool = False) -> float:
-    """Return a single amplitude as a float that is at least 1, and with ``above`` above 1."""
+def check_lifting_amplitude(a: ArrayLike, *, excludes_one: bool = False) -> float:
+    """Return a single amplitude as a float that is at least 1, and with ``excludes_one`` above 1."""
     amplitude = require_scalar(check_amplitude(a), "a")
-    if amplitude < 1.0 or (above and amplitude == 1.0):
-        bound = "above" if above else "at least"
+    if amplitude < 1.0 or (excludes_one and amplitude == 1.0):
+        bound = "above" if excludes_one else "at least"
         raise OptionError(f"{{}} must be {bound} 1, so that the block uplifts; got {amplitude:g}", "a", value=a)
     return amplitude
 
@@ -192,7 +192,7 @@ def first_interval(a: ArrayLike, omega: ArrayLike) -> Floats:
     Notes
     -----
     Source: Eq. 32 of the paper. Correction: Eqs 31 and 32 print 32/5 for 32/15, because T_{0;3} stops at Phi^(5)
-    although Phi^(6) enters at the same order. The exact value is the first interval of `sequence`.
+    although Phi^(6) enters at the same order. The exact value is the first interval of `chattering_sequence`.
 
     Examples
     --------

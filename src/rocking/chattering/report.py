@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.chattering.duration import chattering_time, critical_amplitude, sequence
+from rocking.chattering.duration import chattering_sequence, chattering_time, critical_amplitude
 from rocking.chattering.expansions import MAX_ORDER, asymptotic_table, first_impact_speed, first_interval
 from rocking.core import checks
 from rocking.core.result import Result, format_some_rows
@@ -84,8 +84,8 @@ class ChatteringReport(Result):
             (f"  by Eq. 75{impacts}", self._format_time(times["semianalytical"])),
             ("  by Eq. 65", f"{self._format_time(times['asymptotic'])}{caveat}"),
             (f"  by a series, {values['order']} terms", f"{self._format_time(times['series'])}{caveat}"),
-            ("first interval", self._format_pair(values["first_interval"], "eq32", time=True)),
-            ("speed at first impact", self._format_pair(values["first_impact_speed"], "eq34", time=False)),
+            ("first interval", self._format_pair(values["first_interval"], "eq32", is_time=True)),
+            ("speed at first impact", self._format_pair(values["first_impact_speed"], "eq34", is_time=False)),
         ]
         units = "times are p t, counted from uplift; speeds are theta'/(p alpha)"
         return "\n".join(f"{name:<30}{text}" for name, text in lines) + f"\n\n{units}"
@@ -143,11 +143,11 @@ class ChatteringReport(Result):
             return "none"
         return f"{bracket['upper'] - bracket['lower']:.1e} wide, from {format_count(bracket['impacts'], 'impact')}"
 
-    def _format_pair(self, values: dict[str, float], equation: str, *, time: bool) -> str:
+    def _format_pair(self, values: dict[str, float], equation: str, *, is_time: bool) -> str:
         approximate = f"{values[equation]:.9g} by Eq. {equation[2:]}"
         if math.isnan(values["exact"]):
             return f"none within half a period; {approximate}"
-        exact = self._format_time(values["exact"]) if time else f"{values['exact']:.9g}"
+        exact = self._format_time(values["exact"]) if is_time else f"{values['exact']:.9g}"
         return f"{exact} exact, {approximate}"
 
 
@@ -183,7 +183,7 @@ def chattering_report(
     """
     if p is not None:
         p = checks.positive(p, "p", OptionError, "rad/s")
-    chattering = sequence(a, omega, eta)
+    chattering = chattering_sequence(a, omega, eta)
     interval = speed = 0.0 if chattering.is_complete else math.nan
     if chattering.impacts.size:
         interval, speed = chattering.impacts[["interval", "speed_before"]][0]

@@ -15,7 +15,7 @@ from cyclopts import App, Argument, CycloptsError, MissingArgumentError, Unknown
 
 from rocking.core.checks import suggest
 from rocking.core.progress import notes_for
-from rocking.errors import INTERRUPTED, DamagedStudyError, OptionError, RockingError, Spelling
+from rocking.errors import INTERRUPT_MESSAGE, DamagedStudyError, OptionError, RockingError, Spelling
 from rocking.inputs.texts import write_option_name
 
 app = App(
@@ -102,7 +102,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(f"rocking: {message}", file=sys.stderr)
             sys.exit(2)
     # Outside `except`: the traceback would keep alive iterators that own threads.
-    print(INTERRUPTED, file=sys.stderr)
+    print(INTERRUPT_MESSAGE, file=sys.stderr)
     sys.exit(130)
 
 

@@ -18,12 +18,12 @@ from rocking.analysis.survey import create_file_stem
 from rocking.block import Block, Blocks
 from rocking.chattering.report import chattering_report, critical_report
 from rocking.cli.options import (
-    BLOCK,
-    INTEGER,
-    MEASURE,
-    MODEL,
-    RECORDS,
-    RISK,
+    BLOCK_OPTIONS,
+    INTENSITY_OPTIONS,
+    MODEL_OPTIONS,
+    READ_INTEGER,
+    RECORD_OPTIONS,
+    RISK_OPTIONS,
     BlockOptions,
     ClusterOptions,
     EnsembleOptions,
@@ -38,7 +38,7 @@ from rocking.cli.options import (
     UnscaledOptions,
     read_ensemble_arguments,
 )
-from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
+from rocking.cli.output import OUTPUT_OPTIONS, OutputOptions, print_result, write_results, write_tables
 from rocking.core.result import DatasetResult
 from rocking.errors import BlockError, OptionError
 from rocking.inputs.bodies import create_block, note_likely_mistakes
@@ -62,9 +62,9 @@ def spectrum(
     ensemble: Path | None = None,
     fractiles: str = "0.16,0.5,0.84",
     against: Abscissa = "p",
-    motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[SlipSchemeOptions, MODEL] = SlipSchemeOptions(),
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
+    model: Annotated[SlipSchemeOptions, MODEL_OPTIONS] = SlipSchemeOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Compute rocking spectra: peak rotation against the frequency parameter or the size of the block.
 
@@ -123,9 +123,9 @@ def map(
     gamma: float | None = None,
     kind: str | None = None,
     rtol: float = 1e-6,
-    block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
-    model: Annotated[SlipOptions, MODEL] = SlipOptions(),
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    block: Annotated[BlockOptions, BLOCK_OPTIONS] = BlockOptions(),
+    model: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Map the outcomes of a pulse over its amplitude and frequency, with refined boundaries.
 
@@ -166,11 +166,11 @@ def map(
 def ida(
     *names: Names,
     rtol: float = 1e-6,
-    measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
-    block: Annotated[ObjectOptions, BLOCK] = ObjectOptions(),
-    motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
-    model: Annotated[SlipOptions, MODEL] = SlipOptions(),
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    measure: Annotated[MeasureOptions, INTENSITY_OPTIONS] = MeasureOptions(),
+    block: Annotated[ObjectOptions, BLOCK_OPTIONS] = ObjectOptions(),
+    motion: Annotated[UnscaledOptions, RECORD_OPTIONS] = UnscaledOptions(),
+    model: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Scale motions up until the block overturns and beyond (incremental dynamic analysis).
 
@@ -200,11 +200,11 @@ def measures(
     periods: str = "0.5,1,2",
     damping: float = 0.05,
     also: str | None = None,
-    clusters: Annotated[ClusterOptions, RISK] = ClusterOptions(),
-    block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
-    motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
-    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    clusters: Annotated[ClusterOptions, RISK_OPTIONS] = ClusterOptions(),
+    block: Annotated[EnsembleOptions, BLOCK_OPTIONS] = EnsembleOptions(),
+    motion: Annotated[UnscaledOptions, RECORD_OPTIONS] = UnscaledOptions(),
+    model: Annotated[ModelOptions, MODEL_OPTIONS] = ModelOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Compare intensity measures by the scatter of the intensities at which motions first overturn a block.
 
@@ -278,10 +278,10 @@ def chatter(
     eta: float,
     *,
     p: float | None = None,
-    order: Annotated[int, INTEGER] = 4,
-    impact_count: Annotated[int | None, INTEGER] = None,
+    order: Annotated[int, READ_INTEGER] = 4,
+    impact_count: Annotated[int | None, READ_INTEGER] = None,
     table: Annotated[bool, Parameter(negative="")] = False,
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Compute how long a slender block chatters under a sine and whether it comes to rest, by every method.
 
@@ -319,7 +319,7 @@ def chatter(
         print_result(result, text, as_json=output.as_json)
 
 
-def critical(omega: float, eta: float, *, output: Annotated[OutputOptions, OUTPUT] = OutputOptions()) -> None:
+def critical(omega: float, eta: float, *, output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions()) -> None:
     """Compute the amplitude up to which chattering under a sine is complete, by every method.
 
     --out contains result.json.

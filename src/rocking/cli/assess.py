@@ -12,18 +12,18 @@ from cyclopts import Parameter
 
 from rocking.assessment.assess import assess as assess_objects
 from rocking.cli.options import (
-    INTEGER,
-    MEASURE,
-    MODEL,
-    RECORDS,
-    RISK,
+    INTENSITY_OPTIONS,
+    MODEL_OPTIONS,
+    READ_INTEGER,
+    RECORD_OPTIONS,
+    RISK_OPTIONS,
     MeasureOptions,
     MotionOptions,
     Names,
     RiskOptions,
     SlipOptions,
 )
-from rocking.cli.output import OUTPUT, OutputOptions, print_result, skip_on_error
+from rocking.cli.output import OUTPUT_OPTIONS, OutputOptions, print_result, skip_on_error
 from rocking.inputs.inventory import read_labelled
 from rocking.simulation.ensemble import Polarity
 
@@ -31,14 +31,14 @@ from rocking.simulation.ensemble import Polarity
 def assess(
     inventory: Path,
     *names: Names,
-    count: Annotated[int, INTEGER] = 20,
-    samples: Annotated[int, INTEGER] = 50,
+    count: Annotated[int, READ_INTEGER] = 20,
+    samples: Annotated[int, READ_INTEGER] = 50,
     polarity: Annotated[Polarity, Parameter(allow_leading_hyphen=True)] = "both",
-    risk: Annotated[RiskOptions, RISK] = RiskOptions(),
-    measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
-    motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[SlipOptions, MODEL] = SlipOptions(),
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    risk: Annotated[RiskOptions, RISK_OPTIONS] = RiskOptions(),
+    measure: Annotated[MeasureOptions, INTENSITY_OPTIONS] = MeasureOptions(),
+    motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
+    model: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Assess which objects of a table overturn, at which intensity, and how often at a site, in one report.
 

@@ -17,16 +17,16 @@ from rocking.calibration.tables import MeasuredHistory, read_calibration, read_t
 from rocking.calibration.validate import ShakeTest
 from rocking.calibration.validate import validate as run_validation
 from rocking.cli.options import (
-    BLOCK,
-    INTEGER,
-    MODEL,
-    RECORDS,
+    BLOCK_OPTIONS,
+    MODEL_OPTIONS,
+    READ_INTEGER,
+    RECORD_OPTIONS,
     EnsembleOptions,
     FileOptions,
     ModelOptions,
     ScaledPulseOptions,
 )
-from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
+from rocking.cli.output import OUTPUT_OPTIONS, OutputOptions, print_result, write_results, write_tables
 from rocking.core.constants import Model
 from rocking.core.tables import format_count, format_table
 from rocking.errors import OptionError
@@ -34,7 +34,7 @@ from rocking.inputs.quantities import read_bounds, read_number, read_tilt
 from rocking.motion.motion import Motion
 
 #: Default number of candidate blocks.
-_CANDIDATES: Final = 8192
+_DEFAULT_CANDIDATE_COUNT: Final = 8192
 
 
 def calibrate(
@@ -45,14 +45,14 @@ def calibrate(
     alpha: str | None = None,
     restitution: str | None = None,
     two_sided: bool | None = None,
-    candidates: Annotated[int, INTEGER] = _CANDIDATES,
-    folds: Annotated[int, INTEGER] = 0,
+    candidates: Annotated[int, READ_INTEGER] = _DEFAULT_CANDIDATE_COUNT,
+    folds: Annotated[int, READ_INTEGER] = 0,
     predict: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = (),
     motion: str | None = None,
     initial_rotation: str | None = None,
-    seed: Annotated[int, INTEGER] = 0,
-    file: Annotated[ScaledPulseOptions, RECORDS] = ScaledPulseOptions(),
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    seed: Annotated[int, READ_INTEGER] = 0,
+    file: Annotated[ScaledPulseOptions, RECORD_OPTIONS] = ScaledPulseOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Estimate the block from observed outcomes (overturned or not) or from a measured rotation history.
 
@@ -100,7 +100,7 @@ def calibrate(
         table = read_calibration(data, **file.read_metadata(), **file.read_corrections())
         conflicting: dict[str, object] = {"motion": motion, "initial_rotation": initial_rotation}
         if isinstance(table, MeasuredHistory):
-            conflicting = {"predict": predict, "folds": folds, "candidates": candidates != _CANDIDATES}
+            conflicting = {"predict": predict, "folds": folds, "candidates": candidates != _DEFAULT_CANDIDATE_COUNT}
         for name in [name for name, value in conflicting.items() if value]:
             kinds = ("outcomes", "a history") if isinstance(table, MeasuredHistory) else ("a history", "outcomes")
             raise OptionError(f"{{}} requires a table of {kinds[0]}, but this table contains {kinds[1]}", name)
@@ -156,12 +156,12 @@ def validate(
     tests: Path,
     *,
     outlier_probability: float | None = None,
-    bins: Annotated[int, INTEGER] = 10,
-    seed: Annotated[int, INTEGER] = 0,
-    block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
-    file: Annotated[FileOptions, RECORDS] = FileOptions(),
-    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    bins: Annotated[int, READ_INTEGER] = 10,
+    seed: Annotated[int, READ_INTEGER] = 0,
+    block: Annotated[EnsembleOptions, BLOCK_OPTIONS] = EnsembleOptions(),
+    file: Annotated[FileOptions, RECORD_OPTIONS] = FileOptions(),
+    model: Annotated[ModelOptions, MODEL_OPTIONS] = ModelOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Compare the predictions of a block, or of an ensemble from a calibration, with observed outcomes of tests.
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from rocking.cli.options import INTEGER
-from rocking.cli.output import OUTPUT, QuietOptions
+from rocking.cli.options import READ_INTEGER
+from rocking.cli.output import OUTPUT_OPTIONS, QuietOptions
 from rocking.core.progress import note
 from rocking.errors import OptionError
 from rocking.records.named import is_shipped
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 def explore(
     motion: str | None = None,
     *,
-    port: Annotated[int, INTEGER] = 0,
+    port: Annotated[int, READ_INTEGER] = 0,
     no_open: Annotated[bool, Parameter(negative="")] = False,
-    output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
+    output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
     """Open an interactive page that shows how a block rocks, chatters, comes to rest and overturns.
 

@@ -13,15 +13,14 @@ from cyclopts import Parameter
 from rocking.analysis.curve import check_nrml_names
 from rocking.analysis.fragility import Fragility, fit_fragility
 from rocking.analysis.fragility import fragility as fit_simulated
-from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.risk import check_measure
 from rocking.calibration.tables import read_observed
 from rocking.cli.options import (
-    BLOCK,
-    MEASURE,
-    MODEL,
-    RECORDS,
-    RISK,
+    BLOCK_OPTIONS,
+    INTENSITY_OPTIONS,
+    MODEL_OPTIONS,
+    RECORD_OPTIONS,
+    RISK_OPTIONS,
     EnsembleOptions,
     MeasureOptions,
     MotionOptions,
@@ -30,12 +29,11 @@ from rocking.cli.options import (
     SlipSchemeOptions,
     parse_limit_states,
 )
-from rocking.cli.output import OUTPUT, OutputOptions, print_result, skip_on_error, write_results
+from rocking.cli.output import OUTPUT_OPTIONS, OutputOptions, print_result, skip_on_error, write_results
 from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import write_csv
 from rocking.errors import FitError, OptionError
-from rocking.motion.scaling import Measure
 from rocking.simulation.ensemble import Polarity
 
 if TYPE_CHECKING:
@@ -50,12 +48,12 @@ def fragility(
     larger: Annotated[bool, Parameter(negative="")] = False,
     taxonomy: str = "rocking-block",
     standing: float | None = None,
-    risk: Annotated[RiskOptions, RISK] = RiskOptions(),
-    measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
-    block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
-    motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[SlipSchemeOptions, MODEL] = SlipSchemeOptions(),
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    risk: Annotated[RiskOptions, RISK_OPTIONS] = RiskOptions(),
+    measure: Annotated[MeasureOptions, INTENSITY_OPTIONS] = MeasureOptions(),
+    block: Annotated[EnsembleOptions, BLOCK_OPTIONS] = EnsembleOptions(),
+    motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
+    model: Annotated[SlipSchemeOptions, MODEL_OPTIONS] = SlipSchemeOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Fit the probability that a block overturns, or exceeds a rotation, against the intensity of the motions.
 
@@ -107,10 +105,9 @@ def fragility(
         records: dict[str, Any] = {}
         if outcomes is not None:
             observed = read_observed(outcomes, intensity_measure, **motion.read_metadata(), **motion.read_corrections())
-            _check_hazard(curve, observed["measure"])
             fitted = fit_fragility(**observed, confidence=risk.confidence)
         else:
-            _check_hazard(curve, intensity_measure)
+            check_measure(curve, intensity_measure)  # before the simulations
             loaded = motion.read_all(names)
             records, settings = loaded.to_dict(), measure.create_arguments(motion.component)
             settings |= model.create_arguments() | bodies
@@ -140,11 +137,6 @@ def fragility(
                 _add_record_names(fitted, result.get("records", [])).to_csv(folder / "outcomes.csv", "outcomes")
             write_results(folder, figures=figures, result=result)
         print_result(result, "\n\n".join(texts), as_json=output.as_json)
-
-
-def _check_hazard(curve: HazardCurve | None, measure: Measure) -> None:
-    if curve is not None:
-        check_measure(curve, measure)
 
 
 def _find_standing_limit(names: list[str]) -> str:

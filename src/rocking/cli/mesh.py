@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from rocking.block import Block
-from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
+from rocking.cli.output import OUTPUT_OPTIONS, OutputOptions, print_result, write_results, write_tables
 from rocking.core.progress import note
 from rocking.core.tables import format_table, write_csv
 from rocking.errors import OptionError
@@ -31,7 +31,7 @@ def mesh(
     unit: str = "m",
     turn: _Signed = None,
     restitution: str | None = None,
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Compute the mass of a body from a mesh, its resistance in every direction, and the equivalent blocks.
 

@@ -53,16 +53,16 @@ Item = TypeVar("Item")
 OptionsClass = TypeVar("OptionsClass", bound="InputOptions")
 
 #: Spread over the options of a command, each group under its own heading in the help.
-MEASURE: Final = Parameter(name="*", group=Group("Intensity", sort_key=0))
-BLOCK: Final = Parameter(name="*", group=Group("Block", sort_key=1))
-RECORDS: Final = Parameter(name="*", group=Group("Records", sort_key=2))
-MODEL: Final = Parameter(name="*", group=Group("Model", sort_key=3))
+INTENSITY_OPTIONS: Final = Parameter(name="*", group=Group("Intensity", sort_key=0))
+BLOCK_OPTIONS: Final = Parameter(name="*", group=Group("Block", sort_key=1))
+RECORD_OPTIONS: Final = Parameter(name="*", group=Group("Records", sort_key=2))
+MODEL_OPTIONS: Final = Parameter(name="*", group=Group("Model", sort_key=3))
 
 #: Records as arguments, including a lone hyphen.
 Names = Annotated[
     str,
     Parameter(
-        name="RECORDS",
+        name="RECORD_OPTIONS",
         allow_leading_hyphen=True,
         help="Record files, folders, patterns (*.AT2), names of shipped records (see rocking records), or - for "
         "standard input. A file's format is recognised by its content.",
@@ -77,7 +77,7 @@ def _convert_integer(_: Any, tokens: Sequence[Token]) -> int:
 
 
 #: Reader of integers; the parser itself would round 1.5 to an integer.
-INTEGER: Final = Parameter(converter=_convert_integer)
+READ_INTEGER: Final = Parameter(converter=_convert_integer)
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ class ObjectOptions(RestrainedOptions, _InventoryOptions):
         return self.create_objects(self.create_body, labels)
 
 
-_SAMPLES: Final = 100
+_DEFAULT_SAMPLE_COUNT: Final = 100
 _SAMPLES_HELP: Final = (
     "Number of sampled blocks if a size or parameter is uncertain (mean +- standard deviation), as in --width '0.30 +- "
     "0.02'; 100 by default."
@@ -195,17 +195,16 @@ class EnsembleOptions(RestrainedOptions):
     """Block described by its sizes or parameters, possibly uncertain, or an ensemble from a calibration."""
 
     ensemble: Annotated[Path | None, Parameter(help=_ENSEMBLE_HELP)] = None
-    samples: Annotated[int | None, INTEGER, Parameter(help=_SAMPLES_HELP)] = None
-    seed: Annotated[int | None, INTEGER, Parameter(help="Seed of the samples, 0 by default.")] = None
+    samples: Annotated[int | None, READ_INTEGER, Parameter(help=_SAMPLES_HELP)] = None
+    seed: Annotated[int | None, READ_INTEGER, Parameter(help="Seed of the samples, 0 by default.")] = None
 
     def create_block_arguments(self, model: ModelOptions) -> dict[str, Any]:
         """Return blocks, weights and equation of motion as arguments."""
         if self.ensemble is None:
             values = self.read_uncertain(*declared.BLOCK_INPUTS, "one_sided", "lean")
             if bodies.find_uncertain(values):
-                blocks = bodies.sample_bodies(
-                    values, self.samples or _SAMPLES, self.seed or 0, bodies.read_forces(self.supplied_texts())
-                )
+                forces, count = bodies.read_forces(self.supplied_texts()), self.samples or _DEFAULT_SAMPLE_COUNT
+                blocks = bodies.sample_bodies(values, count, self.seed or 0, forces)
                 return {"blocks": blocks, "model": model.model}
             for name in self.supplied_texts("samples", "seed"):
                 message = "{} requires an uncertain size or parameter, as in {} '0.30 +- 0.02'"
@@ -459,10 +458,10 @@ class MeasureOptions(IntensityOptions):
 
 
 #: Default time for probabilities, years.
-_YEARS: Final = 50.0
+_DEFAULT_YEARS: Final = 50.0
 
 #: Options among those of the command itself.
-RISK: Final = Parameter(name="*")
+RISK_OPTIONS: Final = Parameter(name="*")
 _CLUSTERS_HELP: Final = (
     "Groups of records for the intervals: station groups the components of one station in one earthquake, as named in "
     "the files; or a label for each record, separated by commas. By default each record is a group."
@@ -490,8 +489,8 @@ class RiskOptions(ClusterOptions):
 
     confidence: Annotated[float, Parameter(help="Probability of the intervals and bands.")] = 0.9
     hazard: Annotated[Path | None, Parameter(help=_HAZARD_HELP)] = None
-    site: Annotated[int, INTEGER, Parameter(help="Row of OpenQuake's file, from 0.")] = 0
-    years: Annotated[float, Parameter(help="Time of the probabilities, years.")] = _YEARS
+    site: Annotated[int, READ_INTEGER, Parameter(help="Row of OpenQuake's file, from 0.")] = 0
+    years: Annotated[float, Parameter(help="Time of the probabilities, years.")] = _DEFAULT_YEARS
 
     def read_hazard(self, measure: IntensityOptions, component: ComponentName) -> HazardCurve | None:
         """Check the numbers, and read the hazard curve, if any, with notes."""
@@ -500,7 +499,7 @@ class RiskOptions(ClusterOptions):
         checks.fraction(self.confidence, "confidence", OptionError)
         checks.positive(self.years, "years", OptionError)
         if self.hazard is None:
-            for name, is_given in {"site": self.site != 0, "years": self.years != _YEARS}.items():
+            for name, is_given in {"site": self.site != 0, "years": self.years != _DEFAULT_YEARS}.items():
                 if is_given:
                     raise OptionError("{} requires a hazard curve; add one with {}, or omit it", name, "hazard")
             return None

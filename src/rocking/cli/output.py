@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rocking.core.result import Result
 
 
-OUTPUT: Final = Parameter(name="*", group=Group("Output", sort_key=4))
+OUTPUT_OPTIONS: Final = Parameter(name="*", group=Group("Output", sort_key=4))
 
 
 @dataclass(frozen=True)

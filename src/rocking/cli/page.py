@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from rocking.cli.output import OUTPUT, QuietOptions
+from rocking.cli.output import OUTPUT_OPTIONS, QuietOptions
 from rocking.core.tables import write_text
 
 
@@ -16,7 +16,7 @@ def page(
     out: Path = Path("block.html"),
     records: str | None = None,
     class_links: Annotated[Path | None, Parameter("--class")] = None,
-    output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
+    output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
     """Write a page with a rocking block that needs no server and no installation: one HTML file.
 

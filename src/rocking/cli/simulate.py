@@ -12,9 +12,9 @@ from cyclopts import Parameter
 
 from rocking.analysis.survey import create_folder_names, survey
 from rocking.cli.options import (
-    BLOCK,
-    MODEL,
-    RECORDS,
+    BLOCK_OPTIONS,
+    MODEL_OPTIONS,
+    RECORD_OPTIONS,
     FileOptions,
     FreeObjectOptions,
     MotionOptions,
@@ -26,7 +26,7 @@ from rocking.cli.options import (
     read_records,
 )
 from rocking.cli.output import (
-    OUTPUT,
+    OUTPUT_OPTIONS,
     OutputOptions,
     PrintOptions,
     create_subfolder,
@@ -35,7 +35,7 @@ from rocking.cli.output import (
     write_results,
 )
 from rocking.core.progress import note
-from rocking.core.tables import format_table, to_json
+from rocking.core.tables import format_table, list_some, to_json
 from rocking.errors import OptionError, RecordError
 from rocking.inputs.notes import list_reading_notes
 from rocking.inputs.pulses import FAMILIES, PulseFamily
@@ -72,11 +72,11 @@ def simulate(
     *names: Names,
     each: Annotated[bool, Parameter(negative="")] = False,
     energy: Annotated[bool, Parameter(negative="")] = False,
-    start: Annotated[_ResponseOptions, MODEL] = _ResponseOptions(),
-    block: Annotated[ObjectOptions, BLOCK] = ObjectOptions(),
-    motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[SlipSchemeOptions, MODEL] = SlipSchemeOptions(),
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    start: Annotated[_ResponseOptions, MODEL_OPTIONS] = _ResponseOptions(),
+    block: Annotated[ObjectOptions, BLOCK_OPTIONS] = ObjectOptions(),
+    motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
+    model: Annotated[SlipSchemeOptions, MODEL_OPTIONS] = SlipSchemeOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Simulate a block under a record and describe its response; for several of either, print one line for each pair.
 
@@ -147,10 +147,10 @@ def _write_response(
 def check(
     *names: Names,
     rules: str | None = None,
-    block: Annotated[FreeObjectOptions, BLOCK] = FreeObjectOptions(),
-    motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
-    model: Annotated[SlipOptions, MODEL] = SlipOptions(),
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+    block: Annotated[FreeObjectOptions, BLOCK_OPTIONS] = FreeObjectOptions(),
+    motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
+    model: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
+    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Compare rules of thumb with the simulated response of a block under records.
 
@@ -178,8 +178,8 @@ def check(
 
 def records(
     *names: Names,
-    file: Annotated[FileOptions, RECORDS] = FileOptions(),
-    output: Annotated[PrintOptions, OUTPUT] = PrintOptions(),
+    file: Annotated[FileOptions, RECORD_OPTIONS] = FileOptions(),
+    output: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions(),
 ) -> None:
     """List the shipped records, or show the content of record files and how it was interpreted.
 
@@ -196,8 +196,7 @@ def records(
     else:
         print("\n\n".join([listing.summary() for listing in listings] + [*messages.values()]))
     if messages:
-        unreadable = ", ".join([*messages][:5]) + (f" and {len(messages) - 5} more" if len(messages) > 5 else "")
-        raise RecordError(f"{len(messages)} of {len(files)} files cannot be read: {unreadable}")
+        raise RecordError(f"{len(messages)} of {len(files)} files cannot be read: {list_some([*messages])}")
 
 
 def _read_contents(name: str, file: FileOptions, *, several: bool) -> Contents:
@@ -213,7 +212,7 @@ def _read_contents(name: str, file: FileOptions, *, several: bool) -> Contents:
     return listing
 
 
-def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
+def pulses(*, output: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions()) -> None:
     """List the pulses that --pulse accepts, with their parameters and defaults."""
     families = FAMILIES.values()
     if output.as_json:

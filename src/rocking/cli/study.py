@@ -10,9 +10,9 @@ from typing import Annotated, Final
 
 from cyclopts import App, Parameter
 
-from rocking.cli.options import INTEGER, MEASURE, IntensityOptions, parse_limit_states
+from rocking.cli.options import INTENSITY_OPTIONS, READ_INTEGER, IntensityOptions, parse_limit_states
 from rocking.cli.output import (
-    OUTPUT,
+    OUTPUT_OPTIONS,
     PrintOptions,
     QuietOptions,
     open_output_folder,
@@ -42,7 +42,7 @@ WRITERS: Final = {".nc": Study.to_netcdf, ".csv": Study.to_csv, ".parquet": Stud
 
 
 @app.command
-def new(file: Path, *, output: Annotated[QuietOptions, OUTPUT] = QuietOptions()) -> None:
+def new(file: Path, *, output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions()) -> None:
     """Write a commented template of a study file.
 
     Parameters
@@ -61,8 +61,8 @@ def create(
     file: Path,
     folder: str,
     *,
-    unit_blocks: Annotated[int | None, INTEGER] = None,
-    output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
+    unit_blocks: Annotated[int | None, READ_INTEGER] = None,
+    output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
     """Create the study of a file in a folder; if the folder exists, check that it contains the same study.
 
@@ -84,9 +84,9 @@ def run(
     folder: str,
     into: str | None = None,
     *,
-    threads: Annotated[int | None, INTEGER] = None,
+    threads: Annotated[int | None, READ_INTEGER] = None,
     part: str | None = None,
-    output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
+    output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
     """Compute the missing units; after Ctrl-C, SIGTERM or any other interruption, run it again to continue.
 
@@ -117,7 +117,7 @@ def run(
 
 
 @app.command
-def status(folder: str, *, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
+def status(folder: str, *, output: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions()) -> None:
     """Show the progress of a study, also while it runs.
 
     Parameters
@@ -133,9 +133,9 @@ def status(folder: str, *, output: Annotated[PrintOptions, OUTPUT] = PrintOption
 def verify(
     folder: str,
     *,
-    recompute: Annotated[int, INTEGER] = 0,
+    recompute: Annotated[int, READ_INTEGER] = 0,
     repair: Annotated[bool, Parameter(negative="")] = False,
-    output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
+    output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
     """Read and check every unit, recompute some units and compare all bits.
 
@@ -164,7 +164,7 @@ def export(
     file: Path,
     *,
     critical: StudyOutcome | None = None,
-    output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
+    output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
     """Write the results to one file.
 
@@ -196,8 +196,8 @@ def report(
     fractiles: str = "0.16,0.5,0.84",
     component: ComponentName = "own",
     larger: Annotated[bool, Parameter(negative="")] = False,
-    measure: Annotated[IntensityOptions, MEASURE] = IntensityOptions(),
-    output: Annotated[PrintOptions, OUTPUT] = PrintOptions(),
+    measure: Annotated[IntensityOptions, INTENSITY_OPTIONS] = IntensityOptions(),
+    output: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions(),
 ) -> None:
     """Fit a fragility curve to the outcomes of each block and compute its spectrum: figures, tables, result.json.
 

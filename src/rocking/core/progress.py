@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import rich.progress
 
 #: Shortest time before a bar is shown, s.
-_DELAY: Final = 1.0
+_BAR_DELAY: Final = 1.0
 
 #: Audience of notes: a person at a terminal, everybody, nobody.
 Audience = Literal["terminal", "everybody", "nobody"]
@@ -112,7 +112,7 @@ class Progress:
     def advance(self, steps: int = 1) -> None:
         """Add completed steps."""
         self.done += steps
-        if not self._show or time.monotonic() - self._start < _DELAY:
+        if not self._show or time.monotonic() - self._start < _BAR_DELAY:
             return
         if self._bar is None:
             self._bar = _start_bar(self.description, self.total)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Number of letters in a line, more than in any table.
-_WIDTH: Final = 100_000
+_MAX_LINE_LENGTH: Final = 100_000
 
 #: Relative rounding error after a few operations.
 _DECIMAL_ROUNDING: Final = 2.0**-50
@@ -77,7 +77,7 @@ def format_table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
         table.add_column(Text(name), justify="right" if numeric else "left", no_wrap=True)
     for row in rows:
         table.add_row(*(Text(format_cell(entry)) for entry in row))
-    console = Console(file=io.StringIO(), width=_WIDTH, color_system=None, legacy_windows=False)
+    console = Console(file=io.StringIO(), width=_MAX_LINE_LENGTH, color_system=None, legacy_windows=False)
     with console.capture() as captured:
         console.print(table)
     return "\n".join(line.rstrip() for line in captured.get().splitlines())
@@ -98,6 +98,18 @@ def format_count(number: float, noun: str) -> str:
         return f"1 {noun}"
     text = f"{number:g}" if isinstance(number, float) else f"{number}"
     return f"{text} {noun[:-1]}ies" if noun.endswith("y") else f"{text} {noun}s"
+
+
+def list_some(names: Sequence[str], most: int = 5) -> str:
+    """Return the first of some names, and the number of others."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+def format_reasons(reasons: Mapping[str, str]) -> list[str]:
+    """Return one line for each reason, after some of the names to which it applies."""
+    by_reason = {reason: [name for name in reasons if reasons[name] == reason] for reason in reasons.values()}
+    return [f"{list_some(names)}: {reason}" for reason, names in by_reason.items()]
 
 
 def format_within(value: float, bounds: tuple[float, float], format_number: Callable[[float], str]) -> str:

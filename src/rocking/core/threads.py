@@ -18,7 +18,7 @@ Item = TypeVar("Item")
 Output = TypeVar("Output")
 
 #: Items per thread that are submitted ahead of the oldest pending result.
-LOOKAHEAD: Final = 16
+ITEMS_AHEAD_PER_THREAD: Final = 16
 
 
 class _Options(NamedTuple):
@@ -28,7 +28,7 @@ class _Options(NamedTuple):
     progress: bool | None = None
 
 
-_DEFAULT: Final = _Options()
+_DEFAULT_OPTIONS: Final = _Options()
 _options: Final = ContextVar[_Options]("options")
 
 
@@ -67,7 +67,7 @@ class set_options:  # noqa: N801 - used as a function and as a context manager
     """
 
     def __init__(self, *, threads: int | None = None, progress: bool | None = None) -> None:
-        options = _options.get(_DEFAULT)
+        options = _options.get(_DEFAULT_OPTIONS)
         if threads is not None:
             options = options._replace(threads=checks.integer(threads, "threads", OptionError, minimum=1))
         if progress is not None:
@@ -83,12 +83,12 @@ class set_options:  # noqa: N801 - used as a function and as a context manager
 
 def choose_thread_count() -> int:
     """Return the number of threads of long computations."""
-    return _options.get(_DEFAULT).threads or count_cores()
+    return _options.get(_DEFAULT_OPTIONS).threads or count_cores()
 
 
 def read_progress_option() -> bool | None:
     """Return whether to draw progress bars, or None by default."""
-    return _options.get(_DEFAULT).progress
+    return _options.get(_DEFAULT_OPTIONS).progress
 
 
 def count_cores() -> int:
@@ -113,7 +113,7 @@ def map_in_threads(
     pool = ThreadPoolExecutor(count)
     try:
         while True:
-            for item in itertools.islice(remaining, LOOKAHEAD * count - len(pending)):
+            for item in itertools.islice(remaining, ITEMS_AHEAD_PER_THREAD * count - len(pending)):
                 try:
                     pending.append(pool.submit(function, item))
                 except RuntimeError as error:

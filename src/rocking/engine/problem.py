@@ -26,7 +26,7 @@ from rocking.motion.motion import Motion
 MAX_SPEED = 1e6
 
 #: Requirement for an argument that may be any body.
-_REQUIREMENT = "a Block or another body"
+_BODY_REQUIREMENT = "a Block or another body"
 
 
 @functools.lru_cache(maxsize=8)
@@ -108,7 +108,7 @@ def require_body(body: Body) -> Body:
     """Return the body, or raise an error if the argument is not a body."""
     if isinstance(body, Block) or (isinstance(body, Body) and not isinstance(body, type)):  # protocols are slow
         return body
-    return require_block(body, _REQUIREMENT)
+    return require_block(body, _BODY_REQUIREMENT)
 
 
 def set_start(

@@ -54,8 +54,8 @@ OUTCOME = np.dtype(
 )  # fmt: skip
 
 #: Step budget of a simulation, besides a few steps for every piece of its motion.
-BUDGET: Final = 3_000_000
-BUDGET_PER_PIECE: Final = 4
+STEP_BUDGET: Final = 3_000_000
+STEP_BUDGET_PER_PIECE: Final = 4
 
 #: Steps per call of a kernel, for one body and for each of many: milliseconds until an interrupt.
 STEPS_PER_SLICE: Final = 50_000
@@ -191,7 +191,7 @@ def require_finished(unfinished: bool) -> None:
     """Raise an error if a required simulation was aborted."""
     if unfinished:
         raise UnfinishedError(
-            f"a simulation was aborted after more than {BUDGET:,} steps, so its outcome is unknown; "
+            f"a simulation was aborted after more than {STEP_BUDGET:,} steps, so its outcome is unknown; "
             "simulate this case alone for its partial response, or give a duration"
         )
 
@@ -234,7 +234,7 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
             # `take` copies records 20 times as fast as indexing, which copies field by field.
             batch = _Batch(group.grounds, index, factors[indices], records.take(indices), states.take(indices))
             piece_counts = np.diff(group.grounds.first_pieces)[index]
-            batch.states["budget"] = _STEPS_OF_FIRST_SLICE + BUDGET_PER_PIECE * piece_counts
+            batch.states["budget"] = _STEPS_OF_FIRST_SLICE + STEP_BUDGET_PER_PIECE * piece_counts
             _march_together(settings, batch, substeps)
             _resume_marches(settings, batch, cancelled)
             state.replace_records(states, indices, batch.states)
@@ -334,7 +334,7 @@ def _resume_marches(settings: Record, batch: _Batch, cancelled: threading.Event 
 
 def count_slices(ground: Ground) -> int:
     """Return the number of slices in the budget of a simulation."""
-    return math.ceil((BUDGET + BUDGET_PER_PIECE * len(ground.pieces)) / STEPS_PER_SLICE)
+    return math.ceil((STEP_BUDGET + STEP_BUDGET_PER_PIECE * len(ground.pieces)) / STEPS_PER_SLICE)
 
 
 def detect_complete_chattering(

@@ -26,7 +26,7 @@ from rocking.block import Block
 from rocking.core.arrays import Floats
 from rocking.core.constants import MODELS, STANDARD_GRAVITY, VERSION
 from rocking.engine.schemes import Certified, VelocityThreshold
-from rocking.engine.tasks import BUDGET, BUDGET_PER_PIECE, STEPS_PER_SLICE, Setup
+from rocking.engine.tasks import STEP_BUDGET, STEP_BUDGET_PER_PIECE, STEPS_PER_SLICE, Setup
 from rocking.errors import KernelsError, OptionError, RockingError, escape_braces
 from rocking.explorer.inputs import read_case
 from rocking.explorer.simulated import MAX_DRAWN_PERIOD
@@ -162,7 +162,7 @@ def describe_computation(names: Sequence[str] = RECORDS) -> dict[str, Any]:
         "endings": _list_codes(state.Ending),
         "events": _list_codes(state.EventKind),
         "ground": {"first": sample.first, "stretch": ground.PIECES_PER_STRETCH, "unit": sample.unit},
-        "budget": {"slice": STEPS_PER_SLICE, "total": BUDGET, "per_piece": BUDGET_PER_PIECE},
+        "budget": {"slice": STEPS_PER_SLICE, "total": STEP_BUDGET, "per_piece": STEP_BUDGET_PER_PIECE},
         "pulses": {name: _describe_pulse(getattr(pulses, name.replace("-", "_"))(1.0, 1.0)) for name in PULSES},
         "records": {name: _describe_record(name) for name in names},
     }  # fmt: skip

@@ -239,6 +239,8 @@ def _read_rows(file: Path, expected: Collection[str]) -> tuple[list[_Heading], l
         if label not in (names := [heading.name for heading in headings]):
             k = next((k for k, name in enumerate(names) if name in synonyms), None)
             headings = [_Heading(label) if j == k else heading for j, heading in enumerate(headings)]
+    if "name" not in [heading.name for heading in headings] and not headings[0].input:
+        headings = [_Heading("name"), *headings[1:]]
     for k, heading in enumerate(headings):
         if heading.name in [other.name for other in headings[:k]]:
             if heading.input or heading.name == "name":

@@ -29,7 +29,7 @@ _MAX_STEP: Final = 0.1
 _PGV_RANGE: Final = (1e-3, _MAX_PGV)
 
 #: Tolerance of evenly spaced times, in steps, and largest fraction of gaps among the steps.
-_TOLERANCE: Final = 0.02
+_TIMING_TOLERANCE: Final = 0.02
 _MAX_GAPS: Final = 0.05
 
 #: Levels without a unit that are read as m/s^2 but are probably in g.
@@ -46,8 +46,8 @@ _MAX_DENSITY: Final = 23_000.0
 #: Largest plausible moment of a restraint per radian, divided by weight times R.
 _MAX_MOMENT: Final = 1e5
 
-_VERTICAL: Final = re.compile(r"(up|down|dn|dwn|ver|vert|vertical|u-?d|z|v|[a-z]{2}z)\b.*", re.IGNORECASE)
-_HORIZONTAL: Final = re.compile(
+_VERTICAL_CHANNEL: Final = re.compile(r"(up|down|dn|dwn|ver|vert|vertical|u-?d|z|v|[a-z]{2}z)\b.*", re.IGNORECASE)
+_HORIZONTAL_CHANNEL: Final = re.compile(
     r"(\d{2,3}|n|e|s|w|ns|ew|n-s|e-w|[ns] ?\d{1,2} ?[ew]|north|east|south|west|h[12]|[a-z]{2}[ne12])( deg.*)?",
     re.IGNORECASE,
 )
@@ -80,7 +80,7 @@ def list_motion_notes(motion: Motion) -> tuple[str, ...]:
 
 def is_vertical(motion: Motion) -> bool:
     """Return whether the name of a motion's channel is that of a vertical component."""
-    return _VERTICAL.fullmatch(_find_origin(motion).channel) is not None
+    return _VERTICAL_CHANNEL.fullmatch(_find_origin(motion).channel) is not None
 
 
 def list_vertical_notes(motion: Motion) -> tuple[str, ...]:
@@ -92,7 +92,7 @@ def list_vertical_notes(motion: Motion) -> tuple[str, ...]:
         return ("the vertical motion is the horizontal one itself: name its own channel or file",)
     notes = [f"the vertical motion: {sentence}" for sentence in list_reading_notes(vertical)]
     direction = _find_origin(vertical).channel
-    if _HORIZONTAL.fullmatch(direction) and not _VERTICAL.fullmatch(direction):
+    if _HORIZONTAL_CHANNEL.fullmatch(direction) and not _VERTICAL_CHANNEL.fullmatch(direction):
         notes.append(f"the channel {direction!r} looks horizontal, but it is taken for the vertical motion")
     for attribute in ("station", "event"):
         upward, level = (getattr(_find_origin(c), attribute) for c in (vertical, motion))
@@ -119,9 +119,9 @@ def _list_gap_notes(motion: Motion) -> list[str]:
     """Return notes on times of a record that skip one or more of its even steps."""
     steps = np.diff(motion.breakpoints)
     step = float(np.median(steps))
-    gaps = np.flatnonzero(np.abs(steps - step) > _TOLERANCE * step)
+    gaps = np.flatnonzero(np.abs(steps - step) > _TIMING_TOLERANCE * step)
     multiples = np.round(steps[gaps] / step)
-    are_multiples = np.all(np.abs(steps[gaps] - multiples * step) <= _TOLERANCE * step)
+    are_multiples = np.all(np.abs(steps[gaps] - multiples * step) <= _TIMING_TOLERANCE * step)
     if not 0 < len(gaps) <= _MAX_GAPS * len(steps) or not are_multiples:
         return []
     others = " and elsewhere" if len(gaps) > 1 else ""

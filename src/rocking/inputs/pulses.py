@@ -34,7 +34,7 @@ PARAMETERS: Final = index_by_name(
     Input("kind", "pulse", "text"),
 )
 #: Amplitude of a pulse that is specified by its velocity.
-_VELOCITY: Final = _declare("amplitude", "velocity", "m/s", "0.6", 0.05, 3.0, "pulse_velocity")
+_VELOCITY_AMPLITUDE: Final = _declare("amplitude", "velocity", "m/s", "0.6", 0.05, 3.0, "pulse_velocity")
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class PulseFamily:
         if name not in self._defaults:
             hint = checks.suggest(name, [*self._defaults], f"it accepts {_join_names(self._defaults)}")
             raise OptionError(f"the pulse {self.name} has no {name}; {hint}")
-        return _VELOCITY if name == "amplitude" and self.is_of_velocity else PARAMETERS[name]
+        return _VELOCITY_AMPLITUDE if name == "amplitude" and self.is_of_velocity else PARAMETERS[name]
 
     def unit(self, parameter: str) -> str:
         """Return the SI unit of a parameter; empty without a unit."""

@@ -27,7 +27,7 @@ _NUMBER_AND_UNIT: Final = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf|nan)\s*(\D.*?)?\s*", re.IGNORECASE
 )
 
-_SI: Final = Unit("", 1.0, 1.0)
+_SI_UNIT: Final = Unit("", 1.0, 1.0)
 _DEGREE: Final = Unit("deg", math.pi / 180.0, 1.0)
 
 
@@ -35,26 +35,26 @@ def _index_units(*units: Unit, **spellings: str) -> dict[str, Unit]:
     """Return units by their plain spellings, with the unit of a number without one, and further spellings."""
     known = {normalise_spelling(unit.name): unit for unit in units}
     further = {spelling: known[name] for name, line in spellings.items() for spelling in line.split()}
-    return {"": _SI, **known, **further}
+    return {"": _SI_UNIT, **known, **further}
 
 
-_METRIC_LENGTHS: Final = (_SI._replace(name="m"), Unit("cm", 1.0, 100.0), Unit("mm", 1.0, 1000.0))
+_METRIC_LENGTHS: Final = (_SI_UNIT._replace(name="m"), Unit("cm", 1.0, 100.0), Unit("mm", 1.0, 1000.0))
 _LENGTHS: Final = _index_units(*_METRIC_LENGTHS, Unit("ft", 3048.0, 1e4), Unit("in", 254.0, 1e4))
-_ANGLES: Final = _index_units(_SI._replace(name="rad"), _DEGREE, deg="° º degree degrees", rad="radian radians")
+_ANGLES: Final = _index_units(_SI_UNIT._replace(name="rad"), _DEGREE, deg="° º degree degrees", rad="radian radians")
 _VELOCITIES: Final = _index_units(*(unit._replace(name=f"{name}/s") for name, unit in _LENGTHS.items() if name))
-_RATES: Final = _index_units(_SI._replace(name="rad/s"), _DEGREE._replace(name="deg/s"), degs="°s")
+_RATES: Final = _index_units(_SI_UNIT._replace(name="rad/s"), _DEGREE._replace(name="deg/s"), degs="°s")
 
 #: Units by their plain spellings, in SI units and radians: the single list, also used by the page of the explorer.
 UNITS: Final[Mapping[str, Mapping[str, Unit]]] = {
     "length": _LENGTHS,
     "position": _LENGTHS,
     "angle": _ANGLES,
-    "acceleration": {"": _SI, **ACCELERATION_UNITS},
+    "acceleration": {"": _SI_UNIT, **ACCELERATION_UNITS},
     "velocity": _VELOCITIES,
-    "frequency": _index_units(_SI._replace(name="Hz"), Unit("rad/s", 0.5 / math.pi, 1.0)),
+    "frequency": _index_units(_SI_UNIT._replace(name="Hz"), Unit("rad/s", 0.5 / math.pi, 1.0)),
     "rate": _RATES,
-    "duration": {"": _SI, **{normalise_spelling(name): unit for name, unit in TIME_UNITS.items()}},
-    "number": {"": _SI},
+    "duration": {"": _SI_UNIT, **{normalise_spelling(name): unit for name, unit in TIME_UNITS.items()}},
+    "number": {"": _SI_UNIT},
 }
 
 

@@ -33,7 +33,7 @@ class Origin:
         Units of the numbers in the file, as spelled there, and units in the heading of a text table.
     start : float or None
         Instant of the first sample by the file's clock, s, or None if unknown, delayed or cut.
-    reversed : bool
+    is_reversed : bool
         Whether the motion (and `azimuth`) is opposite to `channel`.
 
     See Also
@@ -59,12 +59,12 @@ class Origin:
     units: str = ""
     heading_units: str = ""
     start: float | None = None
-    reversed: bool = False
+    is_reversed: bool = False
 
     @property
-    def downwards(self) -> bool:
+    def is_downward(self) -> bool:
         """Whether the motion is positive downwards, by the name of its channel."""
-        return _DOWNWARD_CHANNEL.match(self.channel) is not None and not self.reversed
+        return _DOWNWARD_CHANNEL.match(self.channel) is not None and not self.is_reversed
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class Description:
         origin = self.origin
         if origin is not None and factor < 0.0:
             azimuth = None if origin.azimuth is None else (origin.azimuth + 180.0) % 360.0
-            origin = replace(origin, azimuth=azimuth, reversed=not origin.reversed)
+            origin = replace(origin, azimuth=azimuth, is_reversed=not origin.is_reversed)
         return replace(self, parameters=parameters, origin=origin)
 
     def changed(self, how: str) -> Description:

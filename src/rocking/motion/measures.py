@@ -19,7 +19,7 @@ from rocking.errors import MotionError
 from rocking.motion import piecewise
 
 #: Default damping of a spectral acceleration.
-DAMPING: Final = 0.05
+DEFAULT_DAMPING: Final = 0.05
 
 
 def check_damping(value: object, error: checks.ErrorFactory) -> float:
@@ -155,7 +155,7 @@ class MotionMeasures:
         start_time, end_time = compute_significant_span(self, start, end)
         return end_time - start_time
 
-    def spectral_acceleration(self, period: ArrayLike, damping: float = DAMPING) -> Any:
+    def spectral_acceleration(self, period: ArrayLike, damping: float = DEFAULT_DAMPING) -> Any:
         """Compute the pseudo-spectral acceleration: ``(2 pi/period)**2`` times an oscillator's peak displacement.
 
         Taylor series of the exact solution on each piece follow the linear oscillator from rest until the first

@@ -233,7 +233,7 @@ class Motion(ProcessingMethods):
         if `vertical` is not a motion, or itself has a vertical component.
         """
         origin = vertical.description.origin if isinstance(vertical, Motion) else None
-        if vertical is not None and origin is not None and origin.downwards:
+        if vertical is not None and origin is not None and origin.is_downward:
             vertical = vertical._multiply(-1.0, f"turned upwards, as its channel is called {origin.channel!r}")
         return self if vertical is self.vertical else replace(self, vertical=vertical)
 

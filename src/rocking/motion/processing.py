@@ -15,7 +15,7 @@ from rocking.core.arrays import Floats
 from rocking.errors import MotionError
 from rocking.motion import piecewise
 from rocking.motion.description import Description, Origin, compute_start_delay
-from rocking.motion.measures import DAMPING, MotionMeasures, check_damping
+from rocking.motion.measures import DEFAULT_DAMPING, MotionMeasures, check_damping
 from rocking.motion.piecewise import Piecewise
 
 T = TypeVar("T")
@@ -109,7 +109,7 @@ class ProcessingMethods(MotionMeasures):
             raise MotionError(message)
         factors = compute_rotation_factors(azimuths, target)
         breakpoints, rows = piecewise.align_pieces(self, other)
-        fields: dict[str, Any] = {"channel": f"{target:g} deg", "number": None, "azimuth": target, "reversed": False}
+        fields: dict[str, Any] = {"channel": f"{target:g} deg", "number": None, "azimuth": target, "is_reversed": False}
         origin = replace(self.description.origin or Origin(), **fields)
         first, second = (f"{azimuths[k]:g} deg: {part._describe_origin()}" for k, part in enumerate((self, other)))
         text = f"at {target:g} deg, from {first}; and {second}"
@@ -131,7 +131,7 @@ class ProcessingMethods(MotionMeasures):
         others = {name: part and part.delayed(wait) for name, part in self._collect_other_components().items()}
         return self._derive("delayed", f"delayed by {wait:.6g} s", **pieces, **others)
 
-    def on_floor(self, period: float, damping: float = DAMPING, *, free_vibration: float | None = None) -> Self:
+    def on_floor(self, period: float, damping: float = DEFAULT_DAMPING, *, free_vibration: float | None = None) -> Self:
         """Return the motion of a floor: the absolute acceleration of a linear oscillator under the motion.
 
         Parameters

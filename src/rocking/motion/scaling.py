@@ -15,7 +15,7 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import add_unit
 from rocking.errors import MotionError, OptionError, escape_braces
-from rocking.motion.measures import DAMPING, MotionMeasures, check_damping
+from rocking.motion.measures import DEFAULT_DAMPING, MotionMeasures, check_damping
 from rocking.motion.pairs import compute_directional_peaks, compute_directional_spectrum, iterate_directions
 
 #: Intensity measures of the analyses.
@@ -117,7 +117,7 @@ class Measure:
 
     name: MeasureName
     period: float | tuple[float, ...] | None = None
-    damping: float = DAMPING
+    damping: float = DEFAULT_DAMPING
     component: ComponentName = "own"
 
     def __post_init__(self) -> None:
@@ -136,7 +136,7 @@ class Measure:
             else:
                 periods = tuple(checks.increasing_numbers(self.period, "period", OptionError).tolist())
             object.__setattr__(self, "period", periods)
-        elif self.period is not None or damping != DAMPING:
+        elif self.period is not None or damping != DEFAULT_DAMPING:
             argument = "damping" if self.period is None else "period"
             raise OptionError(f'{{}} applies only to {{}} "sa", not to "{self.name}"', argument, "measure")
 
@@ -192,7 +192,7 @@ class Measure:
 
     @property
     def _oscillator_text(self) -> str:
-        return self._periods_text + ("" if self.damping == DAMPING else f", damping {self.damping:g}")
+        return self._periods_text + ("" if self.damping == DEFAULT_DAMPING else f", damping {self.damping:g}")
 
     @property
     def label(self) -> str:

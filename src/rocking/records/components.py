@@ -6,16 +6,17 @@ import itertools
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 from rocking.core.progress import note
-from rocking.core.tables import format_count
+from rocking.core.tables import format_count, format_reasons
 from rocking.errors import MotionError, RecordError, escape_braces
 from rocking.motion.description import Origin
 from rocking.motion.motion import Motion
 from rocking.records import catalogue, formats
+from rocking.records.formats.channel import Channel
 from rocking.records.formats.source import Request
 from rocking.records.named import correct_motion, expand_record_names, is_shipped, make_names_unique, split_factor
 
@@ -128,44 +129,46 @@ def group_components(
     >>> [group.station for group in group_components("ridgecrest-*")]
     ['CI.CLC China Lake, G2 Tower Rd.', 'CI.TOW2 Tower 2']
     """
-    options: dict[str, Any] = {"dt": dt, "units": units, "baseline": baseline, "highpass": highpass}
-    groups, reasons = _read_groups(names, keep_going=keep_going, **options)
+    groups, reasons = _read_groups(names, dt, units, baseline, highpass, keep_going=keep_going)
     note_skipped(reasons)
     return groups
 
 
 def _read_groups(
-    names: Any, *, dt: float | None, units: str | None, baseline: Any, highpass: float | None, keep_going: bool
+    names: Any, dt: Any, units: Any, baseline: Any, highpass: Any, *, keep_going: bool
 ) -> tuple[tuple[Components, ...], dict[str, str]]:
     """Return the components of `group_components`, and for each file that cannot be read the reason."""
-    groups: dict[tuple[object, ...], list[Motion]] = {}
+    groups, reasons = dict[tuple[object, ...], list[Motion]](), dict[str, str]()
     single = [names] if isinstance(names, (str, os.PathLike)) else names
-    reasons = dict[str, str]()
     for record in expand_record_names([os.fspath(name) for name in single]):
-        name, factor = split_factor(record)
         try:
-            request = Request.create(dt, units, several=True)
-            channels = [] if is_shipped(name) else formats.read_content(name, request)[1]
-            originals = [(f", channel {each.label}", each.motion("none"), each.is_raw) for each in channels]
-            motions = [
-                correct_motion(f"{record}{label}", original, baseline, highpass, is_raw=is_raw)
-                for label, original, is_raw in originals or [("", catalogue.load(name), False)]
-            ]
+            for place, motion in _read_components(record, Request.create(dt, units, several=True), baseline, highpass):
+                origin = motion.description.origin or Origin()
+                key = (origin.station or record, origin.event, origin.format, motion.dt, place, split_factor(record)[1])
+                groups.setdefault(key, []).append(motion)
         except (RecordError, MotionError) as error:
             if not keep_going:
                 raise
             reasons[record] = str(error).removeprefix(error.path or "").lstrip(",: ")
-            continue
-        places = [f"{each.metadata.get('location', '')}{each.name.partition(' b')[2]}" for each in channels] or [""]
-        for motion, place in zip(motions, places, strict=True):
-            origin = motion.description.origin or Origin()
-            key = (origin.station or name, origin.event, origin.format, motion.dt, place, factor)
-            groups.setdefault(key, []).append(motion if factor == 1.0 else motion.scaled(factor))
     if not groups:
         first = ": ".join(next(iter(reasons.items()), ()))
         raise RecordError(f"no record could be read; the first: {escape_braces(first)}")
     created = (_create_components(str(key[0]), str(key[1]), motions) for key, motions in groups.items())
     return tuple(created), reasons
+
+
+def _read_components(record: str, request: Request, baseline: Any, highpass: Any) -> Iterator[tuple[str, Motion]]:
+    """Yield the motions of all channels of a record, with the place of the channel."""
+    name, factor = split_factor(record)
+    channels: Sequence[Channel | None] = [None] if is_shipped(name) else formats.read_content(name, request)[1]
+    for channel in channels:
+        if channel is None:
+            place, motion = "", correct_motion(record, catalogue.load(name), baseline, highpass)
+        else:
+            place, label = channel.name.partition(" b")[2], f"{record}, channel {channel.label}"
+            place += channel.metadata.get("location", "")
+            motion = correct_motion(label, channel.motion("none"), baseline, highpass, is_raw=channel.is_raw)
+        yield place, motion if factor == 1.0 else motion.scaled(factor)
 
 
 def load_pairs(
@@ -212,8 +215,8 @@ def load_pairs(
 
 def note_skipped(reasons: Mapping[str, str]) -> None:
     """Report the records that are not used."""
-    for name, reason in reasons.items():
-        note(f"skipped: {escape_braces(f'{name}: {reason}')}")
+    for text in format_reasons(reasons):
+        note(f"skipped: {escape_braces(text)}")
 
 
 def collect_pairs(
@@ -223,8 +226,8 @@ def collect_pairs(
 
     With `singles`, stations without exactly two horizontal components are not pairs, and their components are separate.
     """
-    names_of_options = ("dt", "units", "baseline", "highpass")
-    groups, reasons = _read_groups(names, keep_going=keep_going, **{key: options.get(key) for key in names_of_options})
+    values = [options.get(name) for name in ("dt", "units", "baseline", "highpass")]
+    groups, reasons = _read_groups(names, *values, keep_going=keep_going)
     motions = list[Motion]()
     for group in groups:
         try:
@@ -232,9 +235,9 @@ def collect_pairs(
                 group.horizontals if singles and len(group.horizontals) != 2 else group.motions(vertical=vertical)
             )
         except (RecordError, MotionError) as error:
-            reasons[group.station] = str(error)
+            reasons[group.station] = str(error).removeprefix(f"{group.station} ")
         if singles and not vertical and group.vertical is not None:
-            reasons[f"{name_components([group.vertical])[0]}, vertical"] = "vertical components are not used"
+            reasons[f"{name_components([group.vertical])[0]}, vertical"] = "vertical components are not included"
     if not motions:
         reason = escape_braces(next(iter(reasons.values()), "there are no records"))
         raise RecordError(f"no station has a pair of horizontal components: {reason}")

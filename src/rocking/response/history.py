@@ -26,7 +26,7 @@ _SAMPLES_PER_STEP: Final = 33
 #: Parts of a step in the search for turning points, and bisections of the time of a turning point, at which the
 #: coordinate is stationary.
 _PARTS_PER_STEP: Final = 8
-_BISECTIONS: Final = 30
+_BISECTION_COUNT: Final = 30
 
 
 #: Bounds on the impacts after the last resolved one: smallest speed, divided by p and in rad, below which the motion
@@ -151,7 +151,7 @@ class TimeHistory:
         peaks, rate = np.abs(states[..., 0]).max(axis=1), (1.0 - 2.0 * side)[:, None] * states[..., 1]
         step, part = np.nonzero((rate[:, :-1] >= 0.0) & (rate[:, 1:] <= 0.0))
         low, high, rows, sign = times[step, part], times[step, part + 1], moving[step], 1.0 - 2.0 * side[step]
-        for _ in range(_BISECTIONS if len(step) else 0):
+        for _ in range(_BISECTION_COUNT if len(step) else 0):
             is_outward = sign * self.compute_states(compute_midpoints(low, high), rows)[:, 1] > 0.0
             low, high = halve(low, high, is_outward, ~is_outward)
         np.maximum.at(peaks, step, np.abs(self.compute_states(low, rows)[:, 0]))

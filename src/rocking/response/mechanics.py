@@ -27,8 +27,8 @@ from rocking.motion import piecewise
 from rocking.response.history import TimeHistory, compute_elongation, compute_plastic_elongations
 
 #: Samples per step, and refinements around the largest one, in the search for extreme forces.
-_SAMPLES: Final = 9
-_REFINEMENTS: Final = 10
+_SAMPLES_PER_STEP: Final = 9
+_REFINEMENT_COUNT: Final = 10
 
 #: Upper bound of the friction of any materials.
 _MAX_FRICTION: Final = 3.0
@@ -133,7 +133,7 @@ class ContactForces:
     def _find_peaks(self, measure: ForceMeasure, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
         """Return the times and values of the maxima in these steps."""
         best_times, best_values = times[:, 0], np.full(len(times), -np.inf)
-        for _ in range(_REFINEMENTS):
+        for _ in range(_REFINEMENT_COUNT):
             values = self._evaluate(measure, times, rows)
             index = values.argmax(axis=1)[:, None]
             value, time_at_max = (np.take_along_axis(array, index, axis=1)[:, 0] for array in (values, times))
@@ -178,11 +178,11 @@ class ContactForces:
             starts = np.union1d(starts, [self.end_time])  # motion after a jump at the end
         ends = np.append(starts[1:], max(self.end_time, starts[-1]))
         rows = self.history.find_rows(starts)
-        fractions = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, _SAMPLES))
+        fractions = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, _SAMPLES_PER_STEP))
         times = starts[:, None] + fractions * (ends - starts)[:, None]
         is_resting = nodes["side"][rows] < 0  # motion before a jump
         times[is_resting, -1] = np.maximum(np.nextafter(times[is_resting, -1], 0.0), times[is_resting, 0])
-        return times, np.repeat(rows[:, None], _SAMPLES, axis=1)
+        return times, np.repeat(rows[:, None], _SAMPLES_PER_STEP, axis=1)
 
 
 #: Number of points of a boundary, and its extent divided by the balance.
@@ -190,7 +190,7 @@ _N_BOUNDARY: Final = 201
 _MAX_RATIO: Final = 1.6
 
 #: Fields of a record that determine the potential.
-_FIELDS: Final = (
+_POTENTIAL_FIELDS: Final = (
     "stiffness", "threshold_slope", "threshold", "slenderness", "added_weight", "added_push", "prestress", "spring",
 )  # fmt: skip
 
@@ -261,7 +261,7 @@ class Energy:
 
     def _potential(self, u: Floats, side: Integers) -> Floats:
         """Return V(u) of these sides, 1/s^2, without cancellation at small rotations."""
-        fields = {name: self.record[name][side] for name in _FIELDS}
+        fields = {name: self.record[name][side] for name in _POTENTIAL_FIELDS}
         weight, push = 1.0 + fields["added_weight"], fields["added_push"]
         if self.nonlinear:
             chord = 2.0 * np.sin(0.5 * u)

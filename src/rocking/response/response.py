@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Width of the column of names in a summary, in characters.
-_WIDTH = 20
+_NAME_WIDTH = 20
 
 #: Largest number of points of a history (memory), and the number for a motion without a step.
 _MAX_POINTS = 50_000_000
@@ -184,7 +184,7 @@ class Response(ResponseData):
         initial state) scaled by 1, 1 +- 1e-6 and 1 +- 3e-6, at most nine decimals and six digits. If the times differ
         by a millisecond, or the peaks in the third digit, their range is reported. See `Response.perturbed`.
         """
-        return format_rows(self.summary_rows(available_friction, precision=precision), _WIDTH)
+        return format_rows(self.summary_rows(available_friction, precision=precision), _NAME_WIDTH)
 
     def to_dict(
         self, available_friction: float | None = None, *, precision: float = MOTION_PRECISION

@@ -46,7 +46,7 @@ else:
 
 #: File that describes a study; its number increases when other versions cannot read it.
 _INPUT_FILE: Final = "study.npz"
-_FORMAT: Final = 4
+_FORMAT_VERSION: Final = 4
 
 #: Folder of the units, inside the folder of the study.
 _UNIT_FOLDER: Final = "units"
@@ -67,8 +67,9 @@ class Store:
         with np.load(io.BytesIO(archive), allow_pickle=False) as arrays:
             self.inputs: dict[str, NDArray[Any]] = dict(arrays)
         header = json.loads(str(self.inputs.pop("about")))
-        if header["format"] != _FORMAT:
-            raise StudyError(f"the study has format {header['format']}; this program reads {_FORMAT}", path=str(path))
+        if header["format"] != _FORMAT_VERSION:
+            message = f"the study has format {header['format']}; this program reads {_FORMAT_VERSION}"
+            raise StudyError(message, path=str(path))
         self.program: str = header["program"]
         #: Record name of each motion, empty for a pulse; an empty sequence if unknown.
         self.records: tuple[str, ...] = tuple(header["records"])
@@ -79,7 +80,7 @@ class Store:
     @staticmethod
     def create(path: str | Path, product: Product, unit: Sequence[int], records: Sequence[str]) -> None:
         """Write a new store into an empty folder."""
-        header = {"format": _FORMAT, "program": identify_program(), "unit": unit, "records": records}
+        header = {"format": _FORMAT_VERSION, "program": identify_program(), "unit": unit, "records": records}
         arrays: dict[str, Any] = _product_to_arrays(product) | {"about": np.array(json.dumps(header))}
         buffer = io.BytesIO()
         np.savez_compressed(buffer, **arrays)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from typing import BinaryIO
 
+from rocking.core.tables import list_some
 from rocking.errors import RecordError, describe_install
 from rocking.motion.motion import Motion
 from rocking.records.formats import table, through_obspy
@@ -191,8 +192,7 @@ def _unknown_format_error(source: Source) -> RecordError:
 
 
 def _choose_channel(source: Source, channels: list[Channel], query: int | str | None, kind: str = "channel") -> Channel:
-    listing = ", ".join(channel.label for channel in channels[:30])
-    listing += f" and {len(channels) - 30} more" if len(channels) > 30 else ""
+    listing = list_some([channel.label for channel in channels], 30)
     if query is None and len(channels) > 1:
         raise source.error(
             f"the file contains {len(channels)} channels; give {{}} as one of {listing}", None, "channel"

@@ -94,12 +94,10 @@ class Format:
     layout: str = ""  # columns of the numbers, such as 8x10, if they may touch
     wide_layout: tuple[Any, ...] = ()  # place in the header's numbers, a number, and the columns that it selects
     count_name: str = "the header"  # name of the count, for messages
-    count_place: tuple[Any, ...] = ()  # place of the count in the header's numbers
-    total_count_places: tuple[
-        Any, ...
-    ] = ()  # places of the counts of acceleration and of other quantities that follow it
-    step_places: tuple[tuple[Any, ...], ...] = ()  # alternative places of the step, and steps per second there
-    rate_place: tuple[Any, ...] = ()  # place of the samples per second
+    places: Mapping[str, Sequence[tuple[str, int, float]]] = field(
+        default_factory=dict
+    )  # statements in the header's numbers
+    total_count_places: tuple[Any, ...] = ()  # places of the counts of acceleration and of what follows it
     precise_step: tuple[int, ...] = ()  # line, start and end of a step with more digits
     fixed_units: str = ""  # unit of all files
     component_names: Mapping[str, str] = field(default_factory=dict)  # names of components by their text in the file
@@ -182,6 +180,11 @@ class Header:
             for name, value in ((name, value) for name, value in match.groupdict().items() if value is not None):
                 line = self.lines[text.count("\n", 0, match.start(name))]
                 self.statements[re.sub(r"_\d$", "", name)].append(Statement(" ".join(value.split()), line.start))
+        for name, places in self.form.places.items():
+            for part, index, divisor in places:
+                number = self.get_number(part, index)
+                text = "" if number == self.form.missing_value else f"{number / divisor:.15g}"
+                self.statements[name].append(Statement(text, self.lines[-1].start))
 
     def _read_parts(self, parts: Sequence[Mapping[str, Any]]) -> bool:
         """Read the parts; return whether each was found."""
@@ -242,16 +245,13 @@ class Header:
     def read_listed(self, name: str, pattern: str) -> None:
         """Read numbers after a line with their count, lines and layout."""
         match = self.read_line(pattern, "a line '... header values follow'")
-        self._read_numbers(name, int(match[1]), int(match[2]), parse_layout(match.string))
+        self.read_numbers(name, int(match[1]), int(match[2]), parse_layout(match.string))
 
-    def read_numbers(self, name: str, count: int, rows: int, layout: str) -> None:
+    def read_numbers(self, name: str, count: int, rows: int, layout: str | Layout | None) -> None:
         """Read this many numbers in this many lines."""
-        self._read_numbers(name, count, rows, Layout.parse(layout))
-
-    def _read_numbers(self, name: str, count: int, rows: int, layout: Layout | None) -> None:
-        start = self.end
+        columns, start = Layout.parse(layout) if isinstance(layout, str) else layout, self.end
         self.skip(rows)
-        self.numbers[name] = read_values(self.source, start, self.end, layout, Count(count, start))
+        self.numbers[name] = read_values(self.source, start, self.end, columns, Count(count, start))
 
     def read_skip(self, *rows: int) -> None:
         """Skip rows of numbers later, as many as leave the stated number of values."""
@@ -298,8 +298,6 @@ class Header:
 
     def find_count(self, surplus: int) -> Count:
         """Return the stated number of values in each column."""
-        if self.form.count_place:
-            return Count(self.get_number(*self.form.count_place), self.offset, max_surplus=surplus)
         counts = [(self._read_number(statement), statement.offset) for statement in self.statements.get("count", ())]
         if len({count for count, _ in counts}) > 1:
             self._fail(f"the header specifies both {counts[0][0]:.15g} and {counts[1][0]:.15g} values", counts[0][1])
@@ -316,12 +314,9 @@ class Header:
 
     def find_step(self, count: float) -> tuple[float | None, int]:
         """Return the sampling step, s, or None for pairs, and the offset of its line."""
-        if self.form.is_paired:
+        if self.form.is_paired or (self.form.missing_value and not self.find("rate")):
             return None, self.offset
-        if self.form.rate_place:
-            rate = self.get_number(*self.form.rate_place)
-            return None if rate == self.form.missing_value else _invert(rate), self.offset
-        if self.form.step_places:
+        if "step" in self.form.places:
             return self._choose_step(count), self.offset
         duration = self.find_number("duration")
         if duration and count and not self.statements.keys() & {"step", "rate"}:
@@ -354,15 +349,13 @@ class Header:
 
     def _choose_step(self, count: float) -> float:
         """Return the first step among the header's numbers that fits the stated duration."""
-        about = self.find_number("about")
-        for name, index, per_second in self.form.step_places:
-            step = self.get_number(name, index) / per_second
-            # The duration is printed in whole seconds, in some files without the last interval.
-            if step > 0.0 and (not about or abs(count * step - about) <= 1.0 + step):
-                return float(step)
-        names = " and ".join(str(index) for index in sorted(index for _, index, _ in self.form.step_places))
-        text = f"real headers {names} are inconsistent with {count:.15g} points and the stated duration"
-        self._fail(text, self.offset)
+        about, steps = self.find_number("about"), [self._read_number(each) for each in self.statements["step"]]
+        # The duration is printed in whole seconds, in some files without the last interval.
+        fitting = [step for step in steps if step > 0.0 and (not about or abs(count * step - about) <= 1.0 + step)]
+        if not fitting:
+            text = f"the steps in the real header are inconsistent with {count:.15g} points and the stated duration"
+            self._fail(text, self.offset)
+        return fitting[0]
 
     def _choose_layout(self) -> Layout | None:
         form = self.form
@@ -422,9 +415,8 @@ class Header:
         """Read the stated number of values in several columns, times the stated factor."""
         form, size = self.form, count.values * multiple
         if form.total_count_places:
-            counts = self.numbers[form.total_count_places[0]][
-                form.total_count_places[1] - 1 : form.total_count_places[2]
-            ]
+            name, first, last = form.total_count_places
+            counts = self.numbers[name][first - 1 : last]
             if counts[0] != count.values:
                 self._fail(f"the header specifies both {count.values:.15g} and {counts[0]:.15g} values", count.offset)
             size = float(counts.sum())
@@ -464,19 +456,22 @@ class Header:
             },
         }
 
-    def _check_peak(self, acceleration: Floats, index: int, unit: Unit) -> None:
-        """Raise an error if the peak of a component contradicts the stated one, as with another unit."""
+    def find_peak(self, index: int, unit: Unit) -> float:
+        """Return the stated peak of a component, m/s^2, or 0."""
         statements = [*self.statements.get("peaks", ()), *self.statements.get("peak", ())]
         numbers = [[abs(float(number)) for number in re.findall(NUMBER, each.text)] for each in statements]
         if len(numbers) == 1 and "peaks" in self.statements:
             numbers = [[number] for number in numbers[0]]
-        if index >= len(numbers) or not numbers[index]:
-            return
-        stated = float((find_unit(self.find("peak_units")) or unit).to_si(np.array(max(numbers[index]))))
+        largest = max(numbers[index], default=0.0) if index < len(numbers) else 0.0
+        return float((find_unit(self.find("peak_units")) or unit).to_si(np.array(largest)))
+
+    def _check_peak(self, acceleration: Floats, index: int, unit: Unit) -> None:
+        """Raise an error if the peak of a component contradicts the stated one, as with another unit."""
+        stated = self.find_peak(index, unit)
         peaks = [float(np.abs(values).max()) for values in (acceleration, acceleration - acceleration.mean())]
         if stated > 0.0 and all(peak > 0.0 and not 1.0 / _PEAK_RATIO < peak / stated < _PEAK_RATIO for peak in peaks):
             text = f"the header states a peak of {stated:.4g} m/s^2, but the largest value is {peaks[0]:.4g} m/s^2"
-            self._fail(text, statements[0].offset, "check the units, or download the file again")
+            self._fail(text, self.offset, "check the units, or download the file again")
 
 
 def _merge_repeated(times: Floats, values: Floats) -> tuple[Floats, Floats]:
