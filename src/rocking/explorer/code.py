@@ -35,8 +35,15 @@ def case({y}, {x}):
 
 found = chattering_map(case, {{"{y}": ys, "{x}": xs}})
 print(found.summary())
-points = [[case(y, x) for x in xs] for y in ys]
-peaks = [[rocking.simulate(at.block, at.motion, model=at.model).peak_over_slenderness for at in row] for row in points]
+
+
+def find_peak(at):
+    response = rocking.simulate(at.block, at.motion, model=at.model)
+    slenderness = min(side.alpha for side in at.block.sides)
+    return np.inf if response.overturned else response.peak_rotation / slenderness
+
+
+peaks = [[find_peak(case(y, x)) for x in xs] for y in ys]
 """
 
 _SWEEP: Final = """\

@@ -36,7 +36,7 @@ class Page {
     for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => this.go(/** @type {any} */ (button).dataset.view));
     one("settings").addEventListener("submit", (/** @type {Event} */ event) => event.preventDefault());
     one("to-settings").addEventListener("click", () => this.sheet(!document.body.classList.contains("sheet")));
-    one("settings").addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => { if (event.key === "Escape") this.sheet(false); });
+    addEventListener("keydown", ({key}) => { if (key === "Escape") this.sheet(false); });
     addEventListener("popstate", () => { this.state = readAddress(); this.list.read(this.state); this.showForms(); void this.shake.load.ask(); this.go(this.state.view, false); });
     copyButtons();
     unitFields(() => writeAddress(this.state));
