@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple, overload
 
 from rocking.block import Block, Blocks, RestrainedBlock, Restraint
 from rocking.block.body import Body
-from rocking.block.friction import Friction
+from rocking.block.friction import Friction, check_friction, resolve_friction
 from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import format_count, read_csv_rows
@@ -185,14 +185,17 @@ def read_labelled(file: Path, *, keep_going: bool = False, expected: Collection[
             spreads = {name: values[name] for name in find_uncertain(values)}
             nominal = values | {name: spread.first for name, spread in spreads.items()}
             block, body = create_restrained(nominal, restraints)
+            deviations = {f"{name}{_DEVIATION_SUFFIX}": spread.second for name, spread in spreads.items()}
+            body = body.with_labels(**labels, **deviations)
+            if "friction" in expected:
+                check_friction(body.as_bodies(), "nonlinear", resolve_friction(find_friction(body, None)))
         except RockingError as error:
             if not keep_going:
                 error.path, error.line = error.path or str(file), error.line or line
                 raise
             failures[f"{labels.get('name') or 'object'} (line {line})"] = error.text()
             continue
-        deviations = {f"{name}{_DEVIATION_SUFFIX}": spread.second for name, spread in spreads.items()}
-        entries.append(_Entry(body.with_labels(**labels, **deviations), block, values, restraints, line))
+        entries.append(_Entry(body, block, values, restraints, line))
     if not entries:
         reason = f"; the first failure: {next(iter(failures.values()))}" if failures else ""
         raise RecordError(escape_braces(f"the table contains no objects below its heading{reason}"), path=str(file))
