@@ -24,7 +24,7 @@ from rocking.kernels.lanes import (
     compute_stumpff,
     fill_lane,
     load_samples,
-    write_lane,
+    save_lane,
 )
 from rocking.kernels.series import ValueAndSlope
 from rocking.kernels.state import Record, Records, create_scratch
@@ -117,7 +117,7 @@ def stepped(
     assert busy == np.sum(group["has_event"])
     assert not np.any(group["has_event"][len(blocks) :]) or not np.all(np.isfinite(row))  # empty lanes
     for lane in range(len(blocks)):
-        assert write_lane(pool, lane) == lane
+        assert save_lane(pool, lane) == lane
         assert states[lane]["piece"] == (1 if events[lane] else 2)
     return [Step(blocks[k], before[k], states[k], not events[k]) for k in range(len(blocks))]
 

@@ -11,7 +11,7 @@ import pytest
 import rocking
 from rocking import Block, Damper, RestrainedBlock, Spring, Tendon, dynamics, simulate
 from rocking.errors import OptionError
-from rocking.response.perturbed import choose_steps, list_factors
+from rocking.response.perturbed import choose_factors, list_factors
 
 FREE = Block(width=0.24, height=1.1)
 LEANING = Block.from_parameters(p=(2.0, 2.5), alpha=(0.15, 0.25), restitution=(0.9, 0.8))
@@ -127,7 +127,7 @@ def test_a_summary_counts_outcomes_in_both_ranges_and_takes_the_precision_that_i
     response = simulate(FREE, UNDECIDED.scaled(0.9))
     assert re.search(r"^outcome +(undecided: )?\w+ in \d of 5 motions within 3e-6", response.summary(), re.MULTILINE)
     for precision, text in ((1e-3, "0.1 %"), (0.05, "5 %"), (2e-6, "2e-6")):
-        found = response.perturbed(*choose_steps(precision))
+        found = response.perturbed(*choose_factors(precision))
         assert found.max_deviation == pytest.approx(precision, rel=1e-12)
         last = response.summary(precision=precision).splitlines()[-1]
         assert last == f"{'':20}{found.describe_agreement()}" and last.endswith(f" of 11 motions within {text}")

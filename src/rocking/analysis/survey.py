@@ -27,7 +27,7 @@ from rocking.motion.motion import Motion
 from rocking.records.named import Motions, index_motions, list_motion_names
 from rocking.response import Response
 from rocking.response.mechanics import check_available_friction
-from rocking.response.perturbed import MOTION_PRECISION, choose_steps
+from rocking.response.perturbed import MOTION_PRECISION, choose_factors
 from rocking.response.summary import format_brief_outcome, format_ratio, round_ratio
 from rocking.simulation.ensemble import body_coordinates, list_labels, motion_coordinates
 from rocking.simulation.simulate import simulate
@@ -393,7 +393,7 @@ def require_motion(response: Response) -> Motion:
 
 def _create_row(response: Response, precision: float) -> dict[str, Any]:
     motion = require_motion(response)
-    perturbed, within_precision = response.perturbed(), response.perturbed(*choose_steps(precision))
+    perturbed, within_precision = response.perturbed(), response.perturbed(*choose_factors(precision))
     return {
         add_unit("duration", "s"): motion.duration,
         add_unit("pga", "g"): round_decimal(motion.pga / STANDARD_GRAVITY),

@@ -16,7 +16,7 @@ from cyclopts import App, Argument, CycloptsError, MissingArgumentError, Unknown
 from rocking.core.checks import suggest
 from rocking.core.progress import notes_for
 from rocking.errors import INTERRUPT_MESSAGE, DamagedStudyError, OptionError, RockingError, Spelling
-from rocking.inputs.texts import write_option_name
+from rocking.inputs.texts import format_option_name
 
 app = App(
     name="rocking",
@@ -164,7 +164,7 @@ def create_spelling(command: App) -> Spelling:
     def options() -> frozenset[str]:
         return frozenset(_list_options(command))
 
-    return lambda name: write_option_name(name) if write_option_name(name) in options() else name
+    return lambda name: format_option_name(name) if format_option_name(name) in options() else name
 
 
 def find_command(arguments: Sequence[str]) -> App:

@@ -31,7 +31,7 @@ from rocking.inputs.quantities import (
     read_scaling,
     read_velocity,
 )
-from rocking.inputs.texts import write_option_name
+from rocking.inputs.texts import format_option_name
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import ComponentName, IntensityName, Measure
 from rocking.records.components import collect_pairs, name_components, note_skipped
@@ -225,7 +225,7 @@ def read_ensemble_arguments(file: Path, model: ModelOptions) -> dict[str, Any]:
 
 
 #: Options of `FileOptions`, by the names of arguments.
-_FILE_OPTIONS: Final = {name: write_option_name(name) for name in ("channel", "dt", "units")}
+_FILE_OPTIONS: Final = {name: format_option_name(name) for name in ("channel", "dt", "units")}
 
 
 @_with_inputs(*_FILE_OPTIONS, "baseline", "highpass")

@@ -50,7 +50,7 @@ from rocking.records.named import (
 )
 from rocking.response import Response
 from rocking.response.mechanics import check_available_friction
-from rocking.response.perturbed import MOTION_PRECISION, choose_steps
+from rocking.response.perturbed import MOTION_PRECISION, choose_factors
 from rocking.rules import compare_rules
 from rocking.simulation.simulate import simulate as run_simulation
 
@@ -96,7 +96,7 @@ def simulate(
     """
     if start.available_friction is not None:
         check_available_friction(start.available_friction)  # checked before the simulation
-    choose_steps(start.precision)
+    choose_factors(start.precision)
     summary_options: dict[str, Any] = {name: getattr(start, name) for name in ("available_friction", "precision")}
     body = block.create_bodies()
     options: dict[str, Any] = {**model.create_arguments(), **start.read_values()}

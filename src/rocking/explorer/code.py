@@ -9,7 +9,7 @@ from rocking.explorer.inputs import Case
 from rocking.explorer.maps import Axis, MapGrid, compute_angular_frequency
 from rocking.explorer.parameters import BLOCK_NAMES, NAMES
 from rocking.explorer.periodic import RECORDED_PERIODS, SWEPT, TRANSIENT_PERIODS, Sweep
-from rocking.inputs.texts import write_command
+from rocking.inputs.texts import format_command
 
 _CASE: Final = """\
 import rocking
@@ -104,7 +104,7 @@ def case_as_command(case: Case) -> str | None:
         return None
     excluded = {*BLOCK_NAMES, "motion", "vertical"}
     options = {**case.block_options} | {name: case.texts[name] for name in NAMES if name in {*case.texts} - excluded}
-    return write_command(["rocking", "simulate", *case.words], options)
+    return format_command(["rocking", "simulate", *case.words], options)
 
 
 def map_as_python(grid: MapGrid) -> str:

@@ -16,8 +16,8 @@ from rocking.explorer.uploads import UploadStore
 from rocking.inputs.declared import SCALINGS
 from rocking.inputs.pulses import FAMILIES, read_pulse
 from rocking.inputs.quantities import read_acceleration, read_scaling
-from rocking.inputs.texts import write_arguments as written_arguments
-from rocking.inputs.texts import write_option, write_path
+from rocking.inputs.texts import format_arguments as written_arguments
+from rocking.inputs.texts import format_option, format_path
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 
@@ -95,7 +95,7 @@ def _add_vertical(
     return WrittenMotion(
         _combine(horizontal.motion, vertical.motion),
         f"{horizontal.python}.with_vertical({vertical.python})",
-        (*horizontal.words, *write_option("vertical", *words)) if horizontal.words and words else (),
+        (*horizontal.words, *format_option("vertical", *words)) if horizontal.words and words else (),
     )
 
 
@@ -133,7 +133,7 @@ def _read_file(key: str, values: Values, channel: str | None, uploads: UploadSto
     options = {name: value for name, value in options.items() if value is not None}
     file, arguments = uploads.file(key).name, written_arguments(options)
     call = f"rocking.read({file!r}{', ' if arguments else ''}{arguments})"
-    return WrittenMotion(uploads.read(key, **options), call, (write_path(file),))
+    return WrittenMotion(uploads.read(key, **options), call, (format_path(file),))
 
 
 def is_pulse(text: str) -> bool:

@@ -40,6 +40,12 @@ _MAX_LINKS: Final = 100
 _BINARY: Final = "application/octet-stream"
 _HEADERS: Final = {"x-content-type-options": "nosniff", "referrer-policy": "no-referrer", "cache-control": "no-store"}
 
+#: Headers of the page's own files, of which some are templates: those neither run nor appear in frames.
+_FILE_HEADERS: Final = {
+    "cache-control": "no-cache",
+    "content-security-policy": "script-src 'none'; frame-ancestors 'none'",
+}
+
 #: Folder of the page's own files.
 FOLDER: Final = Path(__file__).with_name("page")
 
@@ -171,8 +177,8 @@ class _Headers:
 
         async def send_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                caching = {"cache-control": "no-cache"} if scope["path"].startswith("/page/") else {}
-                MutableHeaders(scope=message).update(_HEADERS | caching)
+                is_file = scope["path"].startswith("/page/")
+                MutableHeaders(scope=message).update(_HEADERS | (_FILE_HEADERS if is_file else {}))
             await send(message)
 
         await self.app(scope, receive, send_headers)

@@ -21,7 +21,7 @@ from rocking.explorer.parameters import read_count
 from rocking.explorer.payload import Payload
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.quantities import read_number
-from rocking.inputs.texts import write_path
+from rocking.inputs.texts import format_path
 from rocking.motion.scaling import FACTOR
 
 #: Largest map, points, and maximum number of named or offered values of a parameter.
@@ -114,7 +114,7 @@ class StudyView:
             "quantity": quantity,
             "shape": shape,
             "python": f"import rocking\n\n{script}",
-            "command": shlex.join(["rocking", "study", "report", write_path(self.name)]),
+            "command": shlex.join(["rocking", "study", "report", format_path(self.name)]),
         }
         return Payload(header, {"values": (drawn if order == [y, x] else drawn.T).ravel()})
 

@@ -104,7 +104,7 @@ def sample_bodies(values: Mapping[str, Any], count: int, seed: int = 0, restrain
 
 def write_block_call(values: Mapping[str, Any]) -> str:
     """Return the Python call that creates the block."""
-    return f"{find_description(values).make.__qualname__}({texts.write_arguments(_convert_arguments(values))})"
+    return f"{find_description(values).make.__qualname__}({texts.format_arguments(_convert_arguments(values))})"
 
 
 def create_body(

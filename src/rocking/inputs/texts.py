@@ -7,17 +7,17 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 
-def write_arguments(values: Mapping[str, Any]) -> str:
+def format_arguments(values: Mapping[str, Any]) -> str:
     """Format the arguments of a Python call."""
     return ", ".join(f"{name}={value!r}" for name, value in values.items())
 
 
-def write_option_name(name: str) -> str:
+def format_option_name(name: str) -> str:
     """Return the option of an argument: --half-width of half_width."""
     return f"--{name.replace('_', '-')}"
 
 
-def write_option(name: str, value: str) -> tuple[str, ...]:
+def format_option(name: str, value: str) -> tuple[str, ...]:
     """Return an option and its value, as one word if the value alone would be read as another option.
 
     Examples
@@ -25,15 +25,15 @@ def write_option(name: str, value: str) -> tuple[str, ...]:
     >>> write_option("channel", "HNE"), write_option("channel", "--out")
     (('--channel', 'HNE'), ('--channel=--out',))
     """
-    option = write_option_name(name)
+    option = format_option_name(name)
     return (f"{option}={value}",) if value.startswith("-") else (option, value)
 
 
-def write_path(name: str) -> str:
+def format_path(name: str) -> str:
     """Return a file name as an argument that no program reads as an option or as standard input."""
     return f"./{name}" if name.startswith("-") else name
 
 
-def write_command(words: Iterable[str], options: Mapping[str, str]) -> str:
+def format_command(words: Iterable[str], options: Mapping[str, str]) -> str:
     """Format a shell command with its options."""
-    return shlex.join([*words, *(word for name, value in options.items() for word in write_option(name, value))])
+    return shlex.join([*words, *(word for name, value in options.items() for word in format_option(name, value))])

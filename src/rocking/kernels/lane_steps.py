@@ -54,7 +54,7 @@ STEP_CONSTANTS_DTYPE = define_record(
 )
 
 #: Largest bound on the next terms by the last ones, divided by the first two; the truncation is 1/100 of it.
-_NEXT_TERMS = 2.0**-46
+_MAX_NEXT_RATIO = 2.0**-46
 
 
 @inlined
@@ -207,7 +207,7 @@ def take_weighted_substep(group: Record, unit: float, k: int, substeps: int) -> 
         lower, upper = min(r2 + 2.0 * min(r3, 0.0) - tail, 0.0), max(r2 + 2.0 * max(r3, 0.0) + tail, 0.0)
         is_free = is_event_free(group, lane, (u, u1), r1, (lower, upper))
         next_terms = (abs(w) + abs(d)) * (abs(r10) + abs(r11)) + abs(d) * abs(r9)
-        is_free &= abs(q) * next_terms <= _NEXT_TERMS * (abs(r1) + abs(r2))
+        is_free &= abs(q) * next_terms <= _MAX_NEXT_RATIO * (abs(r1) + abs(r2))
         group.has_substep_event[lane] |= not is_free
         group.next_u[lane] = u1
         group.next_v[lane] = v1

@@ -56,12 +56,12 @@ class SimulationPool(NamedTuple):
     """Simulations of blocks under motions, and the lanes in which they run."""
 
     grounds: Grounds  # motions
-    motions: Integers  # index of the motion of each simulation
+    motion_indices: Integers  # index of the motion of each simulation
     factors: Floats  # factor on it
     blocks: Records  # body of each
     states: Records  # state of each
-    steps: Records  # step constants of each
-    ends: Integers  # first piece of each motion that lanes do not step
+    step_constants: Records  # step constants of each
+    end_pieces: Integers  # first piece of each motion that lanes do not step
     groups: Records  # one group of lanes
     counts: Record  # `COUNTS_DTYPE`
     table: Records  # table without rows
@@ -120,11 +120,16 @@ def compute_stumpff(k: int, q: Any) -> Floats:
 @inlined
 def fill_lane(pool: SimulationPool, settings: Record, lane: int, index: int) -> None:
     """Write the state and constants of a simulation into a lane."""
-    group, state, steps, motion = pool.groups[0], pool.states[index], pool.steps[index], pool.motions[index]
+    group, state, steps, motion = (
+        pool.groups[0],
+        pool.states[index],
+        pool.step_constants[index],
+        pool.motion_indices[index],
+    )
     side, first, block = state.side, pool.grounds.first_pieces[motion], pool.blocks[index]
     group.simulation[lane] = index
     group.row[lane] = first + state.piece
-    group.end_row[lane] = first + pool.ends[motion]
+    group.end_row[lane] = first + pool.end_pieces[motion]
     group.increment[lane] = 1
     group.h[lane] = pool.grounds.pieces[first, LENGTH]
     group.factor[lane] = pool.factors[index]
@@ -150,7 +155,7 @@ def fill_lane(pool: SimulationPool, settings: Record, lane: int, index: int) -> 
 
 
 @inlined
-def write_lane(pool: SimulationPool, lane: int) -> int:
+def save_lane(pool: SimulationPool, lane: int) -> int:
     """Write a lane into the state of its simulation at the start of a sample, and return the simulation's index.
 
     The state does not yet contain the largest rotation of a block that still rises.
@@ -158,7 +163,7 @@ def write_lane(pool: SimulationPool, lane: int) -> int:
     group = pool.groups[0]
     index, row = group.simulation[lane], group.row[lane]
     state = pool.states[index]
-    state.piece = row - pool.grounds.first_pieces[pool.motions[index]]
+    state.piece = row - pool.grounds.first_pieces[pool.motion_indices[index]]
     state.offset = 0.0
     state.u = group.u[lane]
     state.v = group.v[lane]
@@ -213,7 +218,7 @@ def march_blocks(settings: Record, scratch: Record, pool: SimulationPool) -> Non
     """Run all simulations of a pool to their ends, one by one; ``ending`` of every state is then an `Ending`."""
     for index in range(pool.blocks.shape[0]):
         state = pool.states[index]
-        ground = select_ground(pool.grounds, pool.motions[index], pool.factors[index])
+        ground = select_ground(pool.grounds, pool.motion_indices[index], pool.factors[index])
         state.ending = march(ground, pool.blocks[index], settings, pool.table, scratch, state)
 
 
@@ -280,7 +285,7 @@ def step_group(settings: Record, pool: SimulationPool, substeps: int) -> int:
 @inlined
 def march_lane(settings: Record, scratch: Record, pool: SimulationPool, lane: int) -> None:
     """March the block of a lane at least through one sample; if its simulation ends, start another one."""
-    index = write_lane(pool, lane)
+    index = save_lane(pool, lane)
     if march_to_sample(settings, scratch, pool, index):
         fill_lane(pool, settings, lane, index)
     else:
@@ -303,9 +308,9 @@ def start_simulation(settings: Record, scratch: Record, pool: SimulationPool, la
 @inlined
 def march_to_sample(settings: Record, scratch: Record, pool: SimulationPool, index: int) -> bool:
     """March a block until it rocks at the start of a sample that lanes may step, or to its end; False at its end."""
-    state, block, motion = pool.states[index], pool.blocks[index], pool.motions[index]
+    state, block, motion = pool.states[index], pool.blocks[index], pool.motion_indices[index]
     ground = select_ground(pool.grounds, motion, pool.factors[index])
-    end = pool.ends[motion]
+    end = pool.end_pieces[motion]
     while True:
         state.stop_piece = state.piece + 1 if state.piece < end else NO_STOP_PIECE
         state.ending = march(ground, block, settings, pool.table, scratch, state)

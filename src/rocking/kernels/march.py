@@ -257,22 +257,22 @@ def slip_along_arc(
     """Take a step of slide-rock, at most to its first event, and return its `StepOutcome`."""
     order, h = expand_slip(ground, block, settings, scratch, state, h_max)
     sign = side_sign(state.side)
-    stick, lost = find_slip_end(scratch, order, h, sign * state.direction)
-    if lost == 0.0:
+    stick_time, loss_time = find_slip_end(scratch, order, h, sign * state.direction)
+    if loss_time == 0.0:
         return StepOutcome.LOST
-    if stick == 0.0 and state.slip_rate == 0.0:  # the cone was only touched: a short step without slip
+    if stick_time == 0.0 and state.slip_rate == 0.0:  # the cone was only touched: a short step without slip
         state.direction = 0
         order, h, _ = expand_arc(ground, block, settings, scratch, state, _TOUCHING_STEP_RATIO * h)
         return finish_step(
             ground, settings, state, advance_to_event(state, scratch, order, h, block.overturn_angle), h_max
         )
-    if stick > 0.0:
-        end = advance_to_event(state, scratch, order, min(h, min(stick, lost)), block.overturn_angle)
+    if stick_time > 0.0:
+        end = advance_to_event(state, scratch, order, min(h, min(stick_time, loss_time)), block.overturn_angle)
         move_slip(scratch, state, order - 1, sign, end.time)
         outcome = finish_step(ground, settings, state, end, h_max)
-        if outcome != StepOutcome.STEP or end.time < min(stick, lost):
+        if outcome != StepOutcome.STEP or end.time < min(stick_time, loss_time):
             return outcome
-        if lost <= stick:
+        if loss_time <= stick_time:
             return StepOutcome.LOST
     state.direction = 0
     state.slip_rate = 0.0
@@ -289,19 +289,19 @@ def slide_flat(ground: Ground, block: Record, settings: Record, table: Records, 
         state.end_time = settings.stop
         return Ending.DONE
     degree = expand_slide(ground, block, scratch, state)
-    h, stick, lost = find_slide_end(ground, block, scratch, state, degree, h_max)
-    t = min(h, min(stick, lost))
+    h, stick_time, loss_time = find_slide_end(ground, block, scratch, state, degree, h_max)
+    t = min(h, min(stick_time, loss_time))
     move_slip(scratch, state, degree, 1.0, t)
     outcome = finish_step(ground, settings, state, StepEnd(StepOutcome.STEP, t, 0.0, 0.0, 0.0, 0.0), h_max)
     if outcome == StepOutcome.STOPPED:
         state.end_time = settings.stop
         write_node(ground, settings, table, state)
         return Ending.DONE
-    if stick <= min(h, lost):
+    if stick_time <= min(h, loss_time):
         state.direction = 0
         state.slip_rate = 0.0
         count_rest(settings, table, state, compute_state_time(ground, state))
-    return lose_contact(ground, settings, table, state) if lost < min(h, stick) else Ending.RUNNING
+    return lose_contact(ground, settings, table, state) if loss_time < min(h, stick_time) else Ending.RUNNING
 
 
 @inlined

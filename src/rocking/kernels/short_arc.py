@@ -42,10 +42,10 @@ _MIN_FRACTION = 0.125
 
 #: Largest sum of the last two terms of a linear velocity, divided by the first two. For small lam t^2, the truncation
 #: is smaller by a factor of at least 18,000.
-_LAST_TERMS = 2.0**-40
+_MAX_LAST_RATIO = 2.0**-40
 
 #: Largest quantity tested by `is_sufficient_weighted`, divided by the first two terms; the truncation is 1/60 of it.
-_NEXT_TERMS = 2.0**-46
+_MAX_NEXT_RATIO = 2.0**-46
 
 #: Largest number of Newton steps, and relative size of the last, whose square is the order of the error.
 _NEWTON_STEPS = 8
@@ -118,7 +118,7 @@ def is_sufficient_weighted(c: RotationCoefficients, lam: float, weight: ValueAnd
     t6 = t2 * t2 * t2
     eighth, ninth = 8.0 * abs(c[8]) * t2, 9.0 * abs(c[9]) * (t2 * t)
     last_terms = (abs(weight[0]) + change) * (eighth + ninth) + change * (7.0 * abs(c[7]) * t)
-    return abs(lam) * t2 * (last_terms * t6) <= _NEXT_TERMS * (abs(c[1]) * t + 2.0 * abs(c[2]) * t2)
+    return abs(lam) * t2 * (last_terms * t6) <= _MAX_NEXT_RATIO * (abs(c[1]) * t + 2.0 * abs(c[2]) * t2)
 
 
 @inlined
@@ -245,7 +245,7 @@ def is_sufficient_linear(c: RotationCoefficients, t: float) -> bool:
     """Return whether nine terms of a linear series are sufficient at t for the velocity to its last place."""
     t2 = t * t
     t4 = t2 * t2
-    return 9.0 * (abs(c[8]) + abs(c[9]) * t) * (t4 * t4) <= _LAST_TERMS * (abs(c[1]) * t + 2.0 * abs(c[2]) * t2)
+    return 9.0 * (abs(c[8]) + abs(c[9]) * t) * (t4 * t4) <= _MAX_LAST_RATIO * (abs(c[1]) * t + 2.0 * abs(c[2]) * t2)
 
 
 @inlined

@@ -1,4 +1,4 @@
-from .catalogue import Record, info, load, names
+from .catalogue import ShippedRecord, info, load, names
 from .components import Components, group_components, load_pairs
 from .formats import channels, identify, read
 from .formats.channel import Channel, Identification
@@ -9,7 +9,7 @@ __all__ = [
     "Components",
     "Contents",
     "Identification",
-    "Record",
+    "ShippedRecord",
     "channels",
     "contents",
     "group_components",

@@ -26,7 +26,7 @@ _DATA_FOLDER: Final = resources.files("rocking.records") / "data"
 
 
 @dataclass(frozen=True)
-class Record:
+class ShippedRecord:
     """Metadata of a shipped record.
 
     Attributes
@@ -101,7 +101,7 @@ def names() -> tuple[str, ...]:
     return tuple(_read_catalogue())
 
 
-def info(name: str) -> Record:
+def info(name: str) -> ShippedRecord:
     """Return the metadata of a shipped record: event, station, direction, step, source and terms.
 
     Parameters
@@ -128,7 +128,7 @@ def info(name: str) -> Record:
     if checks.text(name, "name of a shipped record", RecordError) not in catalogue:
         hint = suggest_records(name, f"there are {', '.join(catalogue)}")
         raise RecordError(f"no shipped record is named {name!r}; {hint}")
-    return Record(name=name, **catalogue[name])
+    return ShippedRecord(name=name, **catalogue[name])
 
 
 def suggest_records(name: str, otherwise: str, prefix: str = "") -> str:
@@ -187,7 +187,7 @@ def load(name: str) -> Motion:
     return Motion.from_samples(samples, record.dt, name=name, description=description)
 
 
-def read_differences(record: Record) -> Integers:
+def read_differences(record: ShippedRecord) -> Integers:
     """Read the second differences of the published integers of a record."""
     with (_DATA_FOLDER / record.archive).open("rb") as file, np.load(file, allow_pickle=False) as archive:
         differences: Integers = archive[record.direction].astype(np.int64)

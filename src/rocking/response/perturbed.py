@@ -119,7 +119,7 @@ class PerturbedSimulations(Result):
     @property
     def is_decided(self) -> bool:
         """Whether the outcome is the same for all factors."""
-        return len({_count_unmoved_as_standing(repeat.outcome) for repeat in self.repeats}) == 1
+        return len({_merge_unmoved(repeat.outcome) for repeat in self.repeats}) == 1
 
     @property
     def peak_range(self) -> tuple[float, float]:
@@ -167,7 +167,7 @@ class PerturbedSimulations(Result):
         return [
             repeat
             for repeat in self.repeats
-            if _count_unmoved_as_standing(repeat.outcome) == _count_unmoved_as_standing(self._unscaled_repeat.outcome)
+            if _merge_unmoved(repeat.outcome) == _merge_unmoved(self._unscaled_repeat.outcome)
         ]
 
     @property
@@ -214,7 +214,7 @@ class PerturbedSimulations(Result):
         }
 
 
-def check_factors(relative_step: float, count: int) -> list[float]:
+def list_checked_factors(relative_step: float, count: int) -> list[float]:
     """Return the factors of `list_factors`, or raise `OptionError` if an argument is out of range."""
     step = checks.between(relative_step, "relative_step", OptionError, 1e-12, 0.1)
     if checks.integer(count, "count", OptionError, 3, 1001) % 2 == 0:
@@ -232,7 +232,7 @@ def list_factors(relative_step: float, count: int) -> list[float]:
     return [*(1.0 - k * relative_step for k in reversed(multiples)), 1.0, *(1.0 + k * relative_step for k in multiples)]
 
 
-def choose_steps(precision: float) -> tuple[float, int]:
+def choose_factors(precision: float) -> tuple[float, int]:
     """Return the relative step and number (eleven) of factors within a precision, for `Response.perturbed`."""
     limit = checks.between(precision, "precision", OptionError, 1e-6, 0.1)
     return limit / (_PRECISION_FACTOR_COUNT - 2), _PRECISION_FACTOR_COUNT
@@ -246,7 +246,7 @@ def format_percent(share: float) -> str:
     return f"{float(mantissa):g}e{int(exponent)}"
 
 
-def _count_unmoved_as_standing(outcome: str) -> str:
+def _merge_unmoved(outcome: str) -> str:
     return STANDS if outcome == UNMOVED else outcome
 
 

@@ -18,7 +18,7 @@ from rocking.errors import OptionError
 from rocking.response import figure, summary
 from rocking.response.figure import RotationUnits
 from rocking.response.history import create_times
-from rocking.response.perturbed import MOTION_PRECISION, choose_steps
+from rocking.response.perturbed import MOTION_PRECISION, choose_factors
 from rocking.response.simulated import ResponseData
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ class Response(ResponseData):
             rows.append(Row("available_friction", available_friction))
             rows.append(Row("sliding_time", self.sliding_time(available_friction), "s"))
         rows += [Row("impacts_resolved", len(self.impacts)), Row("duration", self.duration, "s")]
-        perturbed = [self.perturbed().to_dict(), self.perturbed(*choose_steps(precision)).to_dict()]
+        perturbed = [self.perturbed().to_dict(), self.perturbed(*choose_factors(precision)).to_dict()]
         rows += [Row("time_at_rest", self.time_at_rest, "s"), Row("perturbed", perturbed)]
         rows += [Row("ambiguous", self.ambiguous), Row("ambiguities", self.ambiguities)]
         return [*rows, *(Row(name, columns_to_records(self._convert_table(name))) for name in ("events", "sequences"))]

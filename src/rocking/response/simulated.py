@@ -37,7 +37,7 @@ from rocking.response.perturbed import (
     UNMOVED,
     PerturbedSimulations,
     Repeat,
-    check_factors,
+    list_checked_factors,
 )
 from rocking.response.sensitivity import (
     NEAR_TIE,
@@ -284,7 +284,7 @@ class ResponseData(Result):
         outcome shared by all simulations may still change between their factors.
         """
         if (relative_step, count) not in self._perturbations:
-            repeats = tuple(self._repeat(factor) for factor in check_factors(relative_step, count))
+            repeats = tuple(self._repeat(factor) for factor in list_checked_factors(relative_step, count))
             scaled_input = "initial states" if self.motion is None else "motions"
             self._perturbations[relative_step, count] = PerturbedSimulations(
                 float(relative_step), repeats, self.block.coordinate, scaled_input

@@ -13,7 +13,7 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.result import Row
 from rocking.core.tables import format_count
 from rocking.engine.problem import compute_uplift_thresholds
-from rocking.response.perturbed import choose_steps, format_percent
+from rocking.response.perturbed import choose_factors, format_percent
 from rocking.response.simulated import ResponseData
 
 #: Largest numbers of decimals of a time and digits of a peak, and digits of a range of peaks.
@@ -86,7 +86,7 @@ def create_rows(response: ResponseData, available_friction: float | None, precis
         rows.append(Row("ranges", f"those of the {perturbed.sample_text}; other factors can lead beyond them"))
     without_sliding = "" if math.isnan(sliding) else " (as if it did not slide)"
     rows.append(Row("outcome", _describe_outcome(response), note=without_sliding))
-    return [*rows, Row("", response.perturbed(*choose_steps(precision)).describe_agreement())]
+    return [*rows, Row("", response.perturbed(*choose_factors(precision)).describe_agreement())]
 
 
 def describe_subject(response: ResponseData) -> str:
@@ -127,7 +127,7 @@ def format_outcome(response: ResponseData, overturn_time: str) -> str:
 
 def format_brief_outcome(response: ResponseData, precision: float) -> str:
     """Return the outcome for a row of a table."""
-    perturbed, within_precision = response.perturbed(), response.perturbed(*choose_steps(precision))
+    perturbed, within_precision = response.perturbed(), response.perturbed(*choose_factors(precision))
     counts_overturned = not perturbed.is_decided and perturbed.overturned.any()
     text = perturbed.outcome if perturbed.is_decided else f"undecided: {perturbed.outcome}"
     if counts_overturned:

@@ -88,7 +88,7 @@ class _TextTable(NamedTuple):
     source: Source  # file
     translation: bytes  # translation of a row into numbers with points between blanks
     delimiter: str  # sign between the numbers of a row
-    columns: int  # number of columns
+    column_count: int
     start: int  # offset of the first row
     damaged: tuple[bytes, int] | None  # invalid number in a row before it, and the offset of that row
     heading: Heading  # names and units of the columns
@@ -99,10 +99,10 @@ class _TextTable(NamedTuple):
         # A comma before blanks or at the end of a row is not a decimal sign.
         return (
             self.delimiter == ","
-            and self.columns <= 2
+            and self.column_count <= 2
             and _DECIMAL_COMMA.fullmatch(self.source.read_line(self.start).text.strip().strip('"')) is not None
             and b"." not in self.source.data[self.start :]
-            and not (self.columns == 2 and self.heading.has_names)
+            and not (self.column_count == 2 and self.heading.has_names)
         )
 
     def read(self, request: Request) -> list[Channel]:
@@ -119,7 +119,7 @@ class _TextTable(NamedTuple):
             )
             advice = "use a point as the decimal sign, and separate numbers by blanks"
             raise source.error(f"{text}; {advice}", self.start)
-        numbers = self._read_numbers().reshape(-1, self.columns)
+        numbers = self._read_numbers().reshape(-1, self.column_count)
         heading, dt = self.heading, request.dt
         is_assumed = heading.assumes_times and heading.has_names and heading.columns[0].kind == "time"
         if is_assumed and dt is not None and find_first_fault(numbers[:, 0]) is not None:
@@ -130,7 +130,7 @@ class _TextTable(NamedTuple):
 
     def _create_channels(self, request: Request, numbers: Floats) -> list[Channel]:
         chosen, times = self._find_acceleration_columns(), self.heading.find_columns("time")
-        if self.heading.may_be_spectrum and (self.columns == 1 or times) and np.all(numbers[:, chosen] >= 0.0):
+        if self.heading.may_be_spectrum and (self.column_count == 1 or times) and np.all(numbers[:, chosen] >= 0.0):
             raise self.create_spectrum_error("no value is negative, and no column is named 'time'")
         if not times:
             self._check_step(request.dt)
@@ -146,7 +146,7 @@ class _TextTable(NamedTuple):
             fields = self._read_timing(request, numbers, column)
             heading_unit = unit.name if unit else unknown_unit if _OTHER_UNIT.fullmatch(unknown_unit) else ""
             fields |= {"facts": {"heading units": heading_unit}, "number": number}
-            fields["name"] = Path(self.source.path).stem if self.columns <= 2 and len(chosen) == 1 else name
+            fields["name"] = Path(self.source.path).stem if self.column_count <= 2 and len(chosen) == 1 else name
             unit = request.resolve_unit(self.source, None if is_overruled else unit or unknown_unit, offset)
             values, fields["find_row"] = numbers[:, column], self._find_row_offset
             channels.append(create_channel(self.source, "text table", values, unit, self.start, **fields))
@@ -210,12 +210,12 @@ class _TextTable(NamedTuple):
         parts: list[Any] = []
         while group := list(itertools.islice(rows, 5000)):
             values = convert_tokens([token for tokens, _ in group for token in tokens])
-            is_uneven = any(len(tokens) != self.columns for tokens, _ in group)
+            is_uneven = any(len(tokens) != self.column_count for tokens, _ in group)
             for tokens, offset in group if values is None or is_uneven else ():
                 if invalid := [token for token in tokens if convert_tokens([token]) is None]:
                     raise invalid_number_error(self.source, invalid[0], offset)
-                if len(tokens) != self.columns:
-                    text = f"all rows must have {self.columns} columns; got {len(tokens)} in this row"
+                if len(tokens) != self.column_count:
+                    text = f"all rows must have {self.column_count} columns; got {len(tokens)} in this row"
                     raise self.source.error(text, offset, value=len(tokens))
             parts.append(values)
         return np.concatenate(parts)
@@ -249,10 +249,10 @@ def _is_step(number: str, dt: float) -> bool:
 def recognise_table(source: Source) -> Recognised | None:
     """Recognise rows of one or two numbers after comments and headings, or of more numbers with named columns."""
     table = _find_table(_convert_clock_times(source))
-    if table is None or (table.columns > 2 and not table.heading.has_names):
+    if table is None or (table.column_count > 2 and not table.heading.has_names):
         return None
-    numbers_text = f"{table.columns} numbers, between them {_DELIMITERS[table.delimiter]}"
-    row_text = "one number" if table.columns == 1 else numbers_text
+    numbers_text = f"{table.column_count} numbers, between them {_DELIMITERS[table.delimiter]}"
+    row_text = "one number" if table.column_count == 1 else numbers_text
     reason = f"from line {source.find_line_number(table.start)} on each line holds {row_text}"
     return Recognised("text table", reason, table.read)
 
@@ -262,7 +262,7 @@ def recognise_wrapped(source: Source) -> Recognised | None:
     table = _find_table(source)
     if table is None:
         return None
-    reason = f"from line {source.find_line_number(table.start)} on each line holds {table.columns} numbers"
+    reason = f"from line {source.find_line_number(table.start)} on each line holds {table.column_count} numbers"
     return Recognised("wrapped numbers", reason, functools.partial(_read_wrapped, table))
 
 
@@ -271,13 +271,13 @@ def _read_wrapped(table: _TextTable, request: Request) -> list[Channel]:
     source, start = table.source, table.start
     if table.heading.may_be_spectrum:
         raise table.create_spectrum_error("its heading names spectra")
-    text = f"each line holds {table.columns} numbers"
-    advice = f"name all {table.columns} columns in a heading line"
+    text = f"each line holds {table.column_count} numbers"
+    advice = f"name all {table.column_count} columns in a heading line"
     if request.dt is None:
         text += ", not one (acceleration) or two (time, acceleration); keep only these"
         raise source.error(f"{text}, {advice}, or give {{}} if they are one series", start, "dt")
     values = read_values(source, start, len(source.data), None, StatedCount(0.0, start, max_surplus=math.inf))
-    first = values[: -1 : table.columns]
+    first = values[: -1 : table.column_count]
     if len(first) > 2 and find_first_fault(first) is None and fit_even_step(first) is not None:
         raise source.error(f"{text}, of which the first ones seem to be times; {advice}", start)
     unit, name = request.resolve_unit(source, None, start), Path(source.path).stem
