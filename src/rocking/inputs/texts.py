@@ -22,7 +22,7 @@ def format_option(name: str, value: str) -> tuple[str, ...]:
 
     Examples
     --------
-    >>> write_option("channel", "HNE"), write_option("channel", "--out")
+    >>> format_option("channel", "HNE"), format_option("channel", "--out")
     (('--channel', 'HNE'), ('--channel=--out',))
     """
     option = format_option_name(name)

@@ -103,13 +103,13 @@ class ScalingLevels:
     See Also
     --------
     rocking.Measure : Measure of a ground motion.
-    rocking.simulation.ensemble.Product : Combination of bodies, motions, scales and polarities.
+    rocking.simulation.ensemble.SimulationProduct : Combination of bodies, motions, scales and polarities.
 
     Examples
     --------
     >>> import rocking
-    >>> from rocking.simulation.ensemble import Scales
-    >>> scales = Scales.from_levels([2.0, 4.0], "pga")
+    >>> from rocking.simulation.ensemble import ScalingLevels
+    >>> scales = ScalingLevels.from_levels([2.0, 4.0], "pga")
     >>> scales.factors(rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)).tolist()
     [0.5, 1.0]
     """
@@ -159,7 +159,7 @@ class SimulationProduct:
         n bodies.
     motions : tuple of Motion
         m motions.
-    scales : Scales
+    scales : ScalingLevels
         Scales of the motions.
     polarity : {"+", "-", "both"}
         Original motions, reversed motions, or both.
@@ -173,7 +173,7 @@ class SimulationProduct:
 
     See Also
     --------
-    rocking.simulation.ensemble.Scales : Levels of the motions.
+    rocking.simulation.ensemble.ScalingLevels : Levels of the motions.
     rocking.simulate_many : Simulate all combinations.
 
     Examples

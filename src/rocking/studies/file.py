@@ -91,7 +91,7 @@ class StudyFile:
 
     Attributes
     ----------
-    product : Product
+    product : SimulationProduct
         Blocks, motions, scales and rules.
     skipped : tuple of str
         A sentence for each record that could not be read, if the file allows skipping.

@@ -148,7 +148,7 @@ class Study:
     ----------
     folder : str
         Folder of the study.
-    product : Product
+    product : SimulationProduct
         Inputs of the simulations.
 
     See Also
