@@ -37,7 +37,7 @@ def resolve_friction(friction: Friction | None) -> tuple[float, float] | None:
     values = checks.numbers(friction, "friction", OptionError)
     if values.shape not in ((), (2,)) or not np.all(values > 0.0):
         raise OptionError(
-            "{} must be a positive number or a pair (static, kinetic) of positive numbers, or None for a block that "
+            "{} must be a positive number or a pair (static, kinetic) of positive numbers, or omitted for a block that "
             f"never slips, not {checks.short_repr(friction)}",
             "friction",
             value=friction,
@@ -91,7 +91,7 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
         index = int(np.argmin(largest.min(axis=1)))
         raise OptionError(
             f"the kinetic {{}} must be below {largest[index].min():.4g}, beyond which forces at a pivot have no unique "
-            f"solution; got {kinetic:g}; use a smaller one, or None for a block that never slips",
+            f"solution; got {kinetic:g}; use a smaller one, or omit it for a block that never slips",
             "friction",
             value=kinetic,
         )
