@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hmac
+import os
 import secrets
 import struct
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -78,7 +79,7 @@ class App:
             routes=[
                 Route("/", self._send_page),
                 Route("/block", self._send_block),
-                Mount("/page", StaticFiles(directory=FOLDER)),
+                Mount("/page", _PageFiles(directory=FOLDER)),
                 Route(EXCHANGE, self._exchange, methods=["POST"]),
                 Route("/api/files", self._receive_file, methods=["POST"]),
                 *(Route(f"/api/{name}", self._answer(name)) for name in explorer.names),
@@ -164,6 +165,14 @@ class App:
         name = request.query_params.get("name", "")
         description = await self._run_in_thread(lambda: self.explorer.add_file(name, bytes(data)))
         return JSONResponse(to_plain(description))
+
+
+class _PageFiles(StaticFiles):
+    """Files of the page; some versions of Starlette fail at a path with a zero byte."""
+
+    def lookup_path(self, path: str) -> tuple[str, os.stat_result | None]:
+        """Return the path of a file and its status, None if there is no such file."""
+        return (path, None) if "\0" in path else super().lookup_path(path)
 
 
 class _Headers:
