@@ -1,4 +1,4 @@
-"""Print what is read from the record files of a folder, by format: counts, steps, and peaks against the stated ones."""
+"""Print a table of the record files of a folder by format: counts, steps, and peaks divided by the stated ones."""
 
 from __future__ import annotations
 

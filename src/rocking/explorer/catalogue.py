@@ -19,7 +19,7 @@ from rocking.explorer.uploads import UploadStore, compute_measures
 MAX_ENTRIES: Final = 160
 _MAX_LETTERS: Final = 40_000
 
-#: Names of the texts that tell how a file is read.
+#: Names of the texts that control how a file is read.
 _ANSWERS: Final = ("dt", "units", "baseline", "highpass")
 
 #: Names of components at the end of a file's name or of a channel: azimuths, directions, instrument codes. KiK-net has
@@ -34,7 +34,7 @@ _BOREHOLE: Final = " borehole"
 
 
 class Component(NamedTuple):
-    """Component of a record: its row of the list, and what it has in common with others of its station."""
+    """Component of a record: its row of the list, and the data that it shares with others of its station."""
 
     row: dict[str, Any]
     place: tuple[object, ...]  # equal for components of one sensor
