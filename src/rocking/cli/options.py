@@ -464,7 +464,7 @@ _DEFAULT_YEARS: Final = 50.0
 RISK_OPTIONS: Final = Parameter(name="*")
 _CLUSTERS_HELP: Final = (
     "Groups of records for the intervals: station groups the components of one station in one earthquake, as named in "
-    "the files; or a label for each record, separated by commas. By default each record is a group."
+    "the files; or a label for each record, separated by commas. By default each record, or pair, is a group."
 )
 _HAZARD_HELP: Final = "CSV file of the site's hazard curve (pga_g,annual_rate, or OpenQuake's), for annual rates."
 
