@@ -1,4 +1,4 @@
-"""What the trials share: a study of some dozens of short units, and the digest of all that a study is."""
+"""What the trials share: a study of some dozens of short batches, and the digest of all that a study is."""
 
 import hashlib
 from pathlib import Path
@@ -12,10 +12,10 @@ BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.
 
 
 def made(folder: Path, scales: int = 8) -> Study:
-    """Make a study of six units for each scale, of a hundredth of a second, or open it."""
+    """Make a study of six batches for each scale, of a hundredth of a second, or open it."""
     motions = [rocking.records.load(name) for name in ("el-centro-meloland-270", "el-centro-meloland-360")]
     return rocking.create_study(
-        folder, BLOCKS, motions, levels=np.linspace(2.0, 9.0, scales), measure="pga", unit_blocks=512
+        folder, BLOCKS, motions, levels=np.linspace(2.0, 9.0, scales), measure="pga", blocks_per_batch=512
     )
 
 
@@ -28,6 +28,6 @@ def digest(folder: Path) -> str:
     return total.hexdigest()
 
 
-def units(folder: Path) -> dict[str, bytes]:
-    """Bytes of every unit that is done, by its name."""
-    return {path.name: path.read_bytes() for path in (folder / "units").glob("unit.*")}
+def batches(folder: Path) -> dict[str, bytes]:
+    """Bytes of every batch that is done, by its name."""
+    return {path.name: path.read_bytes() for path in (folder / "batches").glob("batch.*")}

@@ -2,9 +2,9 @@
 
     python stress/kills.py --kills 500
 
-By turns threads (1, 2) and dask.distributed (1, 2 workers) compute, in two orders of units. Of threads the run is
-killed; of a cluster now the run, now a worker, which is then replaced. After every kill each unit that was there is
-there still, and every unit that is there holds the bytes of the undisturbed run.
+By turns threads (1, 2) and dask.distributed (1, 2 workers) compute, in two orders of batches. Of threads the run is
+killed; of a cluster now the run, now a worker, which is then replaced. After every kill each batch that was there is
+there still, and every batch that is there holds the bytes of the undisturbed run.
 """
 
 import argparse
@@ -23,10 +23,10 @@ from unittest.mock import patch
 
 import distributed
 import numpy as np
-from common import digest, made, units
+from common import batches, digest, made
 
 import rocking
-from rocking.studies.units import UnitGrid
+from rocking.studies.batches import BatchGrid
 
 HERE = ("--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0")
 ORDERS = ("as it is", "reversed")
@@ -77,7 +77,7 @@ def run(folder: Path, cluster: Cluster, kind: str, count: int, order: str) -> No
     ordered = keys[::-1] if order == "reversed" else keys
     address = json.loads(cluster.file.read_text())["address"]
     client = contextlib.nullcontext() if kind == "threads" else distributed.Client(address, set_as_default=False)
-    in_order = patch.object(UnitGrid, "__iter__", lambda grid: iter(ordered))
+    in_order = patch.object(BatchGrid, "__iter__", lambda grid: iter(ordered))
     with client as executor, in_order, rocking.set_options(threads=count):
         study.run(executor=executor)
 
@@ -97,9 +97,9 @@ def forked(action: Callable[[], None]) -> int:
 
 def check(folder: Path, seen: dict[str, bytes], reference: dict[str, bytes]) -> dict[str, bytes]:
     """Check that nothing was lost and nothing is wrong."""
-    now = units(folder)
-    assert seen.items() <= now.items(), "a unit that was stored is gone or has changed"
-    assert now.items() <= reference.items(), "a unit differs from the undisturbed run's"
+    now = batches(folder)
+    assert seen.items() <= now.items(), "a batch that was stored is gone or has changed"
+    assert now.items() <= reference.items(), "a batch differs from the undisturbed run's"
     return now
 
 
@@ -135,7 +135,7 @@ def main() -> None:
         try:
             with rocking.set_options(threads=1):
                 made(top / "undisturbed").run()
-            reference, expected = units(top / "undisturbed"), digest(top / "undisturbed")
+            reference, expected = batches(top / "undisturbed"), digest(top / "undisturbed")
             turn = 0
             while sum(killed.values()) < given.kills or turn < len(SETTINGS):
                 kind, count, order = SETTINGS[turn % len(SETTINGS)]
@@ -148,12 +148,12 @@ def main() -> None:
                     victim = killed_once(process, cluster, kind, within, rng)
                     killed.update([victim] if victim else [])
                     before, seen = len(seen), check(folder, seen, reference)
-                    # A busy machine may need longer for a unit than any run is let live.
+                    # A busy machine may need longer for a batch than any run is let live.
                     within *= 1.3 if len(seen) == before else 1.0
                 with rocking.set_options(threads=1):
                     made(folder).run()  # removes what is half-written
                 assert digest(folder) == expected
-                digests[f"{kind} {count}, units {order}"] += 1
+                digests[f"{kind} {count}, batches {order}"] += 1
                 turn += 1
                 print(f"{sum(killed.values())} kills, {turn} studies, {time.monotonic() - start:.0f} s", flush=True)
         finally:

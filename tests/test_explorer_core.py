@@ -777,7 +777,7 @@ def study(tmp_path_factory):
     blocks = rocking.Blocks.grid(p=np.linspace(2.0, 5.0, 7), alpha=np.linspace(0.1, 0.3, 5), restitution=[0.85, 0.9])
     motions = [rocking.pulses.one_sine(1.0, 1.0), rocking.records.load("el-centro-meloland-270")]
     made = rocking.create_study(
-        folder, blocks, motions, levels=[2.0, 4.0], measure="pga", polarity="both", unit_blocks=512
+        folder, blocks, motions, levels=[2.0, 4.0], measure="pga", polarity="both", blocks_per_batch=512
     )
     made.run()
     return StudyView(folder)
@@ -810,7 +810,9 @@ def test_a_slice_of_a_study_is_its_results(study):
 def test_a_verdict_that_the_duration_left_open_is_not_drawn_as_standing(tmp_path):
     blocks = rocking.Blocks.grid(p=[1.5, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
     motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-    made = rocking.create_study(tmp_path / "cut", blocks, motion, levels=[0.01, 1.0], duration=0.9, unit_blocks=512)
+    made = rocking.create_study(
+        tmp_path / "cut", blocks, motion, levels=[0.01, 1.0], duration=0.9, blocks_per_batch=512
+    )
     made.run()
     results = made.results()
     assert results.stopped.values.any()

@@ -599,7 +599,7 @@ def test_a_study_is_shown_and_a_point_of_it_opened(tmp_path, opened):
         rocking.pulses.one_sine(1.0, 1.0),
         levels=[2.0, 4.0],
         measure="pga",
-        unit_blocks=512,
+        blocks_per_batch=512,
     )
     with pytest.raises(StudyError, match="nothing of the study"):
         StudyView(tmp_path / "museum")

@@ -136,7 +136,7 @@ def test_columns_are_one_where_sides_are_equal_and_two_where_they_differ():
 def test_what_a_study_of_walls_computes_another_process_resumes_and_reads(tmp_path, capsys, another):
     bodies, levels = [FACADE, LEANING, RestrainedBlock(FACADE.block, one_sided=True, restitution=0.4)], [1.0, 2.0, 4.0]
     study = rocking.create_study(tmp_path / "walls", bodies, PULSES[:3], levels=levels, measure="pga", polarity="both",
-                          unit_blocks=512)  # fmt: skip
+                          blocks_per_batch=512)  # fmt: skip
     study.run()
     whole = rocking.simulate_many(bodies, PULSES[:3], levels=levels, measure="pga", polarity="both")
     script = f"import rocking; s = rocking.Study({str(tmp_path / 'walls')!r}); s.run(); print(s.status)"

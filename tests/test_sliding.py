@@ -424,7 +424,7 @@ def test_outputs_contain_the_slip(tmp_path: Any, run: Any) -> None:
 def test_a_study_with_friction_is_the_same_after_it_is_opened_again(tmp_path: Any) -> None:
     bodies = [rocking.Block.from_pivots((0.2, 0.25), 1.0, 0.6), rocking.Block.from_pivots((0.2, 0.2), 1.0, 0.65)]
     motion = rocking.pulses.one_sine(2.6, 1.2)
-    study = rocking.create_study(tmp_path / "study", bodies, motion, friction=(0.3, 0.25), unit_blocks=512)
+    study = rocking.create_study(tmp_path / "study", bodies, motion, friction=(0.3, 0.25), blocks_per_batch=512)
     study.run()
     again = rocking.Study(tmp_path / "study")
     assert again.product.friction == (0.3, 0.25)

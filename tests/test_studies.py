@@ -18,13 +18,13 @@ from studies_seen import RUNS, after_each_unit, digest, store_of
 
 import rocking
 from rocking import errors
+from rocking.studies import batches
 from rocking.studies import folder as folders
-from rocking.studies import units
-from rocking.studies.units import OUTCOMES, UnitGrid, decode, format_key
+from rocking.studies.batches import OUTCOMES, BatchGrid, decode, format_key
 
 BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.7)
 MOTIONS = [rocking.pulses.one_sine(4.0, frequency) for frequency in (0.5, 1.0, 2.0)]
-OPTIONS = {"levels": [2.0, 4.0], "measure": "pga", "polarity": "both", "model": "linear", "unit_blocks": 512}
+OPTIONS = {"levels": [2.0, 4.0], "measure": "pga", "polarity": "both", "model": "linear", "blocks_per_batch": 512}
 
 SCRIPT = """
 import sys
@@ -32,11 +32,11 @@ import numpy as np, rocking
 blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.7)
 motions = [rocking.pulses.one_sine(4.0, frequency) for frequency in (0.5, 1.0, 2.0)]
 scales = {"levels": [2.0, 4.0], "measure": "pga", "polarity": "both"}
-study = rocking.create_study(sys.argv[1], blocks, motions, **scales, model="linear", unit_blocks=512)
+study = rocking.create_study(sys.argv[1], blocks, motions, **scales, model="linear", blocks_per_batch=512)
 print("ready", flush=True)
 with rocking.set_options(threads=int(sys.argv[2])):
     report = study.run(part=sys.argv[3] if sys.argv[3:] else None)
-print(report.stopped)
+print(report.ended_early)
 """
 
 
@@ -54,7 +54,7 @@ def complete(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def reference():
-    options = {name: value for name, value in OPTIONS.items() if name != "unit_blocks"}
+    options = {name: value for name, value in OPTIONS.items() if name != "blocks_per_batch"}
     return rocking.simulate_many(BLOCKS, MOTIONS, **options)
 
 
@@ -75,8 +75,8 @@ def test_any_selection_of_the_results_is_that_of_the_whole(complete, reference):
 
 @pytest.mark.thorough
 def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_path, monkeypatch):
-    monkeypatch.setattr(RUNS, "choose_unit_shape", lambda product, unit_blocks: (2, 1, 2, 1024))
-    study = made(tmp_path, unit_blocks=None)
+    monkeypatch.setattr(RUNS, "choose_batch_shape", lambda product, blocks_per_batch: (2, 1, 2, 1024))
+    study = made(tmp_path, blocks_per_batch=None)
     keys = list(store_of(study).grid)
     assert len(keys) == 2 * 2 * 1 * 2
     assert sum(map(store_of(study).grid.count_simulations, keys)) == reference.overturned.size
@@ -86,7 +86,7 @@ def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_pat
     lazy = rocking.Study(tmp_path).results()
     for part in ({"motion": [2, 0], "block": [1299, 5]}, {"polarity": 1, "scale": 0}, {"motion": -1, "block": -1}):
         xr.testing.assert_identical(lazy.isel(part).load(), reference.isel(part))
-    (tmp_path / "units" / format_key(keys[3])).unlink()
+    (tmp_path / "batches" / format_key(keys[3])).unlink()
     found = rocking.Study(tmp_path).results().load()
     np.testing.assert_array_equal(np.isnan(found.impacts.values), ~found.done.values)
     assert (~found.done.values).sum() == store_of(study).grid.count_simulations(keys[3])
@@ -107,7 +107,7 @@ def test_a_study_is_cut_into_some_dozens_of_units_whatever_it_is_long_of(tmp_pat
     sizes = list(map(store_of(study).grid.count_simulations, store_of(study).grid))
     assert sum(sizes) == blocks * motions * scales
     study.run()
-    stored = sum(path.stat().st_size for path in (tmp_path / "units").iterdir())
+    stored = sum(path.stat().st_size for path in (tmp_path / "batches").iterdir())
     assert stored < 2.5 * 64 * sum(sizes)
 
 
@@ -123,45 +123,45 @@ def test_whoever_computes_it_the_store_is_the_same_to_the_byte(complete, tmp_pat
             study.run(executor=pool)
     elif how == "parts":
         with rocking.set_options(threads=1):
-            counts = [study.run(part=part).units for part in ("3/5", "1/5", "2/5", "5/5", "4/5")]
-        assert sum(counts) == study.status.units == 36 and max(counts) - min(counts) <= 1
-        assert study.run().units == 0
+            counts = [study.run(part=part).batch_count for part in ("3/5", "1/5", "2/5", "5/5", "4/5")]
+        assert sum(counts) == study.status.batch_count == 36 and max(counts) - min(counts) <= 1
+        assert study.run().batch_count == 0
     else:
         keys = list(store_of(study).grid)
-        monkeypatch.setattr(UnitGrid, "__iter__", lambda self: iter(keys[::-1]))
+        monkeypatch.setattr(BatchGrid, "__iter__", lambda self: iter(keys[::-1]))
         with rocking.set_options(threads=1):
             study.run()
     assert digest(tmp_path) == digest(complete)
 
 
 def kill_again_and_again(folder, times, rng, least=0):
-    """Run the study in a process that is killed at a random moment, so many times; the units that were seen stay.
+    """Run the study in a process that is killed at a random moment, so many times; the batches that were seen stay.
 
-    A moment comes after the least number of units is there.
+    A moment comes after the least number of batches is there.
     """
     seen = {}
     for _ in range(times):
         command = [sys.executable, "-c", SCRIPT, str(folder), "2"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
             process.stdout.readline()
-            while len([*(folder / "units").glob("unit.*")]) < least:
+            while len([*(folder / "batches").glob("batch.*")]) < least:
                 assert process.poll() is None
             time.sleep(float(rng.uniform(0.0, 0.15)))
             process.send_signal(signal.SIGKILL)
-        units = {path.name: path.read_bytes() for path in (folder / "units").glob("unit.*")}
-        assert seen.items() <= units.items()
-        seen = units
+        batches = {path.name: path.read_bytes() for path in (folder / "batches").glob("batch.*")}
+        assert seen.items() <= batches.items()
+        seen = batches
     return seen
 
 
 @pytest.mark.parametrize("times", [1, pytest.param(2, marks=pytest.mark.thorough)])
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
-def test_a_killed_study_loses_no_unit_and_goes_on_to_the_same_bytes(complete, tmp_path, times):
+def test_a_killed_study_loses_no_batch_and_goes_on_to_the_same_bytes(complete, tmp_path, times):
     seen = kill_again_and_again(tmp_path, times, np.random.default_rng(0), least=1)
     study = made(tmp_path)
     report = study.run()
     assert not report.failed
-    assert seen and report.units == len(store_of(study).grid) - len(seen)
+    assert seen and report.batch_count == len(store_of(study).grid) - len(seen)
     assert digest(tmp_path) == digest(complete)
     assert not list(tmp_path.rglob(".*.part*"))
 
@@ -173,22 +173,22 @@ def test_parts_that_run_at_the_same_time_and_are_killed_are_completed_to_the_sam
     commands = [[sys.executable, "-c", SCRIPT, str(tmp_path), "1", f"{number}/3"] for number in (1, 2, 3)]
     running = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for command in commands]
     running[1].stdout.readline()
-    while len([*(tmp_path / "units").glob("unit.*")]) < 2:
+    while len([*(tmp_path / "batches").glob("batch.*")]) < 2:
         assert running[1].poll() is None or running[0].poll() is None
     running[1].send_signal(signal.SIGKILL)
     for process in running:
         process.communicate()
     assert [process.returncode for process in running] == [0, -signal.SIGKILL, 0]
     study = made(tmp_path)
-    assert 24 <= study.status.done <= 36
+    assert 24 <= study.status.done_count <= 36
     study.run()
     assert study.status.is_complete and digest(tmp_path) == digest(complete)
 
 
 def test_what_a_crash_left_half_written_is_removed(complete, tmp_path):
     study = made(tmp_path)
-    (tmp_path / "units").mkdir()
-    (tmp_path / "units" / ".abc.part").write_bytes(b"half")
+    (tmp_path / "batches").mkdir()
+    (tmp_path / "batches" / ".abc.part").write_bytes(b"half")
     study.run()
     assert digest(tmp_path) == digest(complete)
 
@@ -199,7 +199,7 @@ def test_sigterm_finishes_the_units_in_hand(complete, tmp_path, monkeypatch):
         after_each_unit(patched, lambda: signal.raise_signal(signal.SIGTERM))
         with rocking.set_options(threads=1):
             report = study.run()
-    assert report.stopped and 1 <= report.units == study.status.done <= 3
+    assert report.ended_early and 1 <= report.batch_count == study.status.done_count <= 3
     assert "stopped, run again to continue" in str(report)
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     study.run()
@@ -212,7 +212,7 @@ def test_sigterm_of_another_process_finishes_the_units_in_hand(tmp_path):
     with subprocess.Popen(
         [sys.executable, "-c", SCRIPT, str(tmp_path), "1"], stdout=subprocess.PIPE, text=True
     ) as process:
-        while not [*(tmp_path / "units").glob("unit.*")]:
+        while not [*(tmp_path / "batches").glob("batch.*")]:
             assert process.poll() is None
             time.sleep(0.001)
         process.send_signal(signal.SIGTERM)
@@ -227,22 +227,22 @@ def test_ctrl_c_stops_in_the_middle_of_a_unit(complete, tmp_path, monkeypatch):
         if next(numbers):
             cancelled.wait(30.0)
         stopped.append(cancelled.is_set())
-        return units.compute_unit(work)
+        return batches.compute_batch(work)
 
     with monkeypatch.context() as patched:
-        patched.setattr(RUNS, "compute_unit", compute)
+        patched.setattr(RUNS, "compute_batch", compute)
         after_each_unit(patched, lambda: signal.raise_signal(signal.SIGINT))
         with pytest.raises(KeyboardInterrupt), rocking.set_options(threads=2):
             study.run()
-    assert stopped.count(False) == 1  # the unit that is stored
+    assert stopped.count(False) == 1  # the batch that is stored
     assert len(stopped) == next(numbers) > 1
-    assert study.status.done == 1
+    assert study.status.done_count == 1
     study.run()
     assert digest(tmp_path) == digest(complete)
 
 
 class Broken(ThreadPoolExecutor):
-    """Workers that are gone after a few units."""
+    """Workers that are gone after a few batches."""
 
     left = 4
 
@@ -262,7 +262,7 @@ def test_workers_that_are_gone_end_the_run_and_another_one_goes_on(complete, tmp
         pytest.raises(errors.StudyError, match="the workers were lost: a process ended abruptly; computed"),
     ):
         study.run(executor=pool)
-    assert study.status.done <= 4
+    assert study.status.done_count <= 4
     study.run()
     assert digest(tmp_path) == digest(complete)
 
@@ -274,11 +274,11 @@ def test_units_that_failed_are_computed_by_the_next_run(complete, tmp_path, monk
         raise ArithmeticError("no luck")
 
     with monkeypatch.context() as patched:
-        patched.setattr(RUNS, "compute_unit", broken)
+        patched.setattr(RUNS, "compute_batch", broken)
         with rocking.set_options(threads=1):
             report = study.run()
     assert set(report.failed.values()) == {"ArithmeticError: no luck"}
-    assert len(report.failed) == 36 and study.status.done == 0
+    assert len(report.failed) == 36 and study.status.done_count == 0
     assert not study.run().failed
     assert digest(tmp_path) == digest(complete)
 
@@ -297,8 +297,8 @@ class Failing:
 
 
 def small(folder):
-    """Study of three units."""
-    return rocking.create_study(folder, BLOCKS, MOTIONS[:1], model="linear", unit_blocks=512)
+    """Study of three batches."""
+    return rocking.create_study(folder, BLOCKS, MOTIONS[:1], model="linear", blocks_per_batch=512)
 
 
 @pytest.fixture(scope="module")
@@ -330,36 +330,36 @@ def test_a_write_that_fails_is_one_sentence_and_leaves_nothing_half_visible(
         except rocking.RockingError as error:
             assert os.strerror(code) in str(error)
             assert "\n" not in str(error)
-    for path in (tmp_path / "units").glob("unit.*"):
-        assert path.read_bytes() == (small_complete / "units" / path.name).read_bytes()
+    for path in (tmp_path / "batches").glob("batch.*"):
+        assert path.read_bytes() == (small_complete / "batches" / path.name).read_bytes()
     with rocking.set_options(threads=1):
         small(tmp_path).run()
     assert digest(tmp_path) == digest(small_complete)
     assert not list(tmp_path.rglob(".*.part*"))
 
 
-def test_every_changed_bit_and_every_cut_of_a_unit_is_seen(complete):
-    data, unit = (complete / "units" / "unit.1.1.0.2").read_bytes(), (1, 1, 1, 512)
+def test_every_changed_bit_and_every_cut_of_a_batch_is_seen(complete):
+    data, batch = (complete / "batches" / "batch.1.1.0.2").read_bytes(), (1, 1, 1, 512)
     rng = np.random.default_rng(0)
-    assert decode(data, unit).shape == (len(OUTCOMES), *unit)
+    assert decode(data, batch).shape == (len(OUTCOMES), *batch)
     for _ in range(500):
         changed = bytearray(data)
         changed[rng.integers(len(data))] ^= 1 << rng.integers(8)
-        assert decode(bytes(changed), unit) is None
-        assert decode(data[: rng.integers(len(data))], unit) is None
+        assert decode(bytes(changed), batch) is None
+        assert decode(data[: rng.integers(len(data))], batch) is None
 
 
-def test_a_damaged_unit_is_named_and_computed_again_on_request(complete, tmp_path):
+def test_a_damaged_batch_is_named_and_computed_again_on_request(complete, tmp_path):
     study = made(tmp_path)
     study.run()
-    path = tmp_path / "units" / "unit.1.1.0.2"
+    path = tmp_path / "batches" / "batch.1.1.0.2"
     sound = path.read_bytes()
     path.write_bytes(sound[:-9] + b"\0" + sound[-8:])
-    assert study.results().peak_rotation.isel(motion=0).load().size  # other units can be read
-    with pytest.raises(errors.StudyError, match=r"unit\.1\.1\.0\.2 is damaged"):
+    assert study.results().peak_rotation.isel(motion=0).load().size  # other batches can be read
+    with pytest.raises(errors.StudyError, match=r"batch\.1\.1\.0\.2 is damaged"):
         study.results().load()
     (fault,) = study.verify()
-    assert "unit.1.1.0.2" in fault
+    assert "batch.1.1.0.2" in fault
     study.verify(repair=True)
     assert study.verify(recompute=3) == []
     assert path.read_bytes() == sound
@@ -375,12 +375,12 @@ def test_a_study_that_may_not_be_written_to_can_be_opened(tmp_path, monkeypatch)
     assert rocking.Study(tmp_path).results().peak_rotation.load().size
 
 
-def test_a_unit_that_is_another_s_is_found_by_computing_it_again(small_complete, tmp_path):
+def test_a_batch_that_is_another_s_is_found_by_computing_it_again(small_complete, tmp_path):
     shutil.copytree(small_complete, tmp_path, dirs_exist_ok=True)
     study = rocking.Study(tmp_path)
     names = [format_key(key) for key in store_of(study).grid]
     assert study.verify(recompute=len(names)) == []
-    (tmp_path / "units" / names[0]).write_bytes((tmp_path / "units" / names[1]).read_bytes())
+    (tmp_path / "batches" / names[0]).write_bytes((tmp_path / "batches" / names[1]).read_bytes())
     assert study.verify() == []
     assert any(names[0] in fault for fault in study.verify(recompute=len(names)))
 
@@ -403,9 +403,9 @@ def test_damage_to_what_describes_a_study_is_seen(tmp_path):
 
 def test_what_is_missing_is_never_read_as_a_result(complete, tmp_path):
     study = made(tmp_path)
-    (tmp_path / "units").mkdir()
-    for path in list((complete / "units").glob("unit.*"))[::2]:
-        (tmp_path / "units" / path.name).write_bytes(path.read_bytes())
+    (tmp_path / "batches").mkdir()
+    for path in list((complete / "batches").glob("batch.*"))[::2]:
+        (tmp_path / "batches" / path.name).write_bytes(path.read_bytes())
     found = study.results().load()
     assert 0 < int(found.done.sum()) < found.done.size
     for name in ("overturned", "peak_rotation", "impacts"):
@@ -413,12 +413,12 @@ def test_what_is_missing_is_never_read_as_a_result(complete, tmp_path):
     assert not study.status.is_complete
 
 
-def test_a_unit_that_goes_while_it_is_read_is_no_zero(complete, tmp_path):
+def test_a_batch_that_goes_while_it_is_read_is_no_zero(complete, tmp_path):
     study = made(tmp_path)
     study.run()
     results = study.results()
-    (tmp_path / "units" / "unit.0.0.0.0").unlink()
-    with pytest.raises(errors.StudyError, match=r"unit\.0\.0\.0\.0 was removed"):
+    (tmp_path / "batches" / "batch.0.0.0.0").unlink()
+    with pytest.raises(errors.StudyError, match=r"batch\.0\.0\.0\.0 was removed"):
         results.load()
 
 
@@ -464,7 +464,7 @@ def test_what_is_no_executor_is_refused_before_a_unit(tmp_path, executor):
     study = made(tmp_path)
     with pytest.raises(errors.OptionError, match=r"^executor must be a concurrent.futures.Executor or a client of"):
         study.run(executor=executor)
-    assert study.status.done == 0
+    assert study.status.done_count == 0
 
 
 COLUMNS = [
@@ -518,17 +518,17 @@ def test_a_study_is_exported_to_parquet_or_says_what_is_missing(complete, tmp_pa
 def test_units_have_names_of_their_own_and_other_files_are_none(tmp_path):
     study = made(tmp_path)
     names = [format_key(key) for key in store_of(study).grid]
-    assert len({*names}) == len(store_of(study).grid) == 36 and names[-1] == "unit.2.1.1.2"
-    (tmp_path / "units").mkdir()
-    for name in ("unit.1.2.3", "unit.3.0.0.0", "unit.a.0.0.0", "unit.0.2.0.0", "unit.0.0.0.0.0", "unit."):
-        (tmp_path / "units" / name).touch()
-    assert study.status.done == 0
+    assert len({*names}) == len(store_of(study).grid) == 36 and names[-1] == "batch.2.1.1.2"
+    (tmp_path / "batches").mkdir()
+    for name in ("batch.1.2.3", "batch.3.0.0.0", "batch.a.0.0.0", "batch.0.2.0.0", "batch.0.0.0.0.0", "batch."):
+        (tmp_path / "batches" / name).touch()
+    assert study.status.done_count == 0
 
 
 @pytest.mark.parametrize("width", [0, 100, 513, 1.5])
 def test_units_are_whole_groups_of_blocks(tmp_path, width):
-    with pytest.raises(errors.OptionError, match="unit_blocks"):
-        made(tmp_path, unit_blocks=width)
+    with pytest.raises(errors.OptionError, match="blocks_per_batch"):
+        made(tmp_path, blocks_per_batch=width)
 
 
 def test_a_vertical_component_is_part_of_a_study(tmp_path):
@@ -549,25 +549,25 @@ def test_bodies_of_another_kind_with_the_same_numbers_are_another_study(tmp_path
     motion = rocking.pulses.one_sine(4.0, 1.0)
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     pendulum = rocking.dynamics.InvertedPendulum(p=2.0, gap=0.2, restitution=0.9)
-    rocking.create_study(tmp_path / "one", block, motion, model="linear", unit_blocks=512).run()
-    rocking.create_study(tmp_path / "other", pendulum, motion, model="linear", unit_blocks=512).run()
+    rocking.create_study(tmp_path / "one", block, motion, model="linear", blocks_per_batch=512).run()
+    rocking.create_study(tmp_path / "other", pendulum, motion, model="linear", blocks_per_batch=512).run()
     for folder, bodies in (("one", pendulum), ("other", block)):
         with pytest.raises(errors.StudyError, match="of other inputs"):
-            rocking.create_study(tmp_path / folder, bodies, motion, model="linear", unit_blocks=512)
-    again = rocking.create_study(tmp_path / "other", pendulum, motion, model="linear", unit_blocks=512)
+            rocking.create_study(tmp_path / folder, bodies, motion, model="linear", blocks_per_batch=512)
+    again = rocking.create_study(tmp_path / "other", pendulum, motion, model="linear", blocks_per_batch=512)
     assert float(again.results().peak_rotation.max()) == pytest.approx(0.2)
 
 
 def test_a_study_that_another_process_creates_meanwhile_is_opened(tmp_path, monkeypatch):
-    pilot, motion = RUNS.choose_unit_shape, rocking.pulses.one_sine(4.0, 1.0)
+    pilot, motion = RUNS.choose_batch_shape, rocking.pulses.one_sine(4.0, 1.0)
     blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.9)
 
-    def slow(product, unit_blocks):
-        monkeypatch.setattr(RUNS, "choose_unit_shape", pilot)
-        rocking.create_study(tmp_path, blocks, motion, unit_blocks=512).run()
+    def slow(product, blocks_per_batch):
+        monkeypatch.setattr(RUNS, "choose_batch_shape", pilot)
+        rocking.create_study(tmp_path, blocks, motion, blocks_per_batch=512).run()
         return (1, 1, 1, 1024)
 
-    monkeypatch.setattr(RUNS, "choose_unit_shape", slow)
+    monkeypatch.setattr(RUNS, "choose_batch_shape", slow)
     study = rocking.create_study(tmp_path, blocks, motion)
     assert study.results().sizes["block"] == 1300
     assert not study.verify()
@@ -582,7 +582,7 @@ def test_a_symmetric_block_counts_once_beside_others(tmp_path):
 
     def made(name, blocks):
         study = rocking.create_study(
-            tmp_path / name, blocks, motions, levels=levels, measure="pga", polarity="both", unit_blocks=512
+            tmp_path / name, blocks, motions, levels=levels, measure="pga", polarity="both", blocks_per_batch=512
         )
         study.run()
         return study.spectrum().data, study.block_fragilities().data
@@ -598,7 +598,9 @@ def test_a_symmetric_block_counts_once_beside_others(tmp_path):
 def test_sums_of_weights_in_another_order_make_no_outcome(tmp_path):
     blocks = rocking.Blocks(2.0, np.linspace(0.199, 0.201, 37), 0.9)
     pulses = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(0.45, 0.55, 5)]
-    study = rocking.create_study(tmp_path, blocks, pulses, levels=[1.0, 1.5, 4.0, 5.0], measure="pga", unit_blocks=512)
+    study = rocking.create_study(
+        tmp_path, blocks, pulses, levels=[1.0, 1.5, 4.0, 5.0], measure="pga", blocks_per_batch=512
+    )
     study.run()
     rng = np.random.default_rng(0)
     for _ in range(10):

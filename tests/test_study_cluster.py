@@ -18,14 +18,14 @@ import pytest
 from studies_seen import RUNS, after_each_unit, digest, store_of
 
 import rocking
-from rocking.studies.units import compute_unit
+from rocking.studies.batches import compute_batch
 
 distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="processes are killed the POSIX way")
 
 HERE = ["--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0"]
 BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 2048), alpha=0.2, restitution=0.9)
-UNITS = 20
+BATCHES = 20
 
 
 def connected(address, timeout=5.0):
@@ -33,10 +33,10 @@ def connected(address, timeout=5.0):
 
 
 def made(folder):
-    """Make a study of 20 units of a few hundredths of a second."""
+    """Make a study of 20 batches of a few hundredths of a second."""
     motion = rocking.records.load("el-centro-meloland-270")
     return rocking.create_study(
-        folder, BLOCKS, motion, levels=np.linspace(2.0, 8.0, UNITS), measure="pga", unit_blocks=2048
+        folder, BLOCKS, motion, levels=np.linspace(2.0, 8.0, BATCHES), measure="pga", blocks_per_batch=2048
     )
 
 
@@ -85,7 +85,7 @@ def cluster(tmp_path):
 
 
 def test_a_client_is_run_as_its_executor_is(tmp_path):
-    """Without a worker's process: units are pickled and computed as on a cluster."""
+    """Without a worker's process: batches are pickled and computed as on a cluster."""
     here = {"protocol": "tcp", "host": "127.0.0.1", "dashboard_address": None, "processes": False}
     pulse = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
     with (
@@ -97,9 +97,9 @@ def test_a_client_is_run_as_its_executor_is(tmp_path):
             "its executor": client.get_executor(pure=False),
             "threads": None,
         }.items():
-            study = rocking.create_study(tmp_path / name, BLOCKS, pulse, levels=[0.5, 1.0], unit_blocks=1024)
+            study = rocking.create_study(tmp_path / name, BLOCKS, pulse, levels=[0.5, 1.0], blocks_per_batch=1024)
             report = study.run(executor=executor)
-            assert (report.units, report.failed) == (4, {})
+            assert (report.batch_count, report.failed) == (4, {})
     assert digest(tmp_path / "client") == digest(tmp_path / "its executor") == digest(tmp_path / "threads")
 
 
@@ -107,39 +107,39 @@ def test_a_client_is_run_as_its_executor_is(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complete, tmp_path, cluster, monkeypatch):
-    # One of two workers is killed in the middle: the other one takes over its units.
+def test_a_cluster_loses_a_worker_a_batch_and_its_scheduler_but_no_result(complete, tmp_path, cluster, monkeypatch):
+    # One of two workers is killed in the middle: the other one takes over its batches.
     study = made(tmp_path / "worker")
     with connected(cluster.address) as client:
         client.wait_for_workers(2)
         with monkeypatch.context() as patched:
             after_each_unit(patched, cluster.workers[0].kill)
             report = study.run(executor=client)
-        assert (report.units, report.failed) == (UNITS, {})
+        assert (report.batch_count, report.failed) == (BATCHES, {})
         assert len(client.nthreads()) == 1
     assert digest(tmp_path / "worker") == complete
 
-    # A unit kills its worker, every time: it fails, alone, and can be computed later.
-    study = made(tmp_path / "unit")
+    # A batch kills its worker, every time: it fails, alone, and can be computed later.
+    study = made(tmp_path / "batch")
     poison = store_of(study).create_input((0, 7, 0, 0)).factors[0, 0, 0]
 
     def deadly(work):
         if work.factors[0, 0, 0] == poison:
             os._exit(1)
-        return compute_unit(work)
+        return compute_batch(work)
 
     cluster.start_worker()
     with connected(cluster.address) as client:
         client.wait_for_workers(2)
         client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 0))
-        monkeypatch.setattr(RUNS, "compute_unit", deadly)
+        monkeypatch.setattr(RUNS, "compute_batch", deadly)
         report = study.run(executor=client)
         monkeypatch.undo()
-    assert "KilledWorker" in report.failed["unit.0.7.0.0"]
+    assert "KilledWorker" in report.failed["batch.0.7.0.0"]
     assert len(report.failed) <= 2  # with the one that waited behind it
     with rocking.set_options(threads=1):
         study.run()
-    assert digest(tmp_path / "unit") == complete
+    assert digest(tmp_path / "batch") == complete
 
     # The scheduler is killed: one sentence, and no waiting for what will never come.
     study = made(tmp_path / "scheduler")
@@ -151,7 +151,7 @@ def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complet
     ):
         after_each_unit(patched, cluster.scheduler.kill)
         study.run(executor=client)
-    assert 0 < study.status.done < UNITS
+    assert 0 < study.status.done_count < BATCHES
     with rocking.set_options(threads=1):
         study.run()
     assert digest(tmp_path / "scheduler") == complete
@@ -160,7 +160,7 @@ def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complet
 def test_a_worker_with_another_program_is_told_so(tmp_path):
     work = store_of(made(tmp_path)).create_input((0, 0, 0, 0))
     with pytest.raises(rocking.errors.StudyError, match=r"has rocking .*, the study requires rocking 9\.9\.9"):
-        compute_unit(replace(work, program="rocking 9.9.9 (kernels 0)"))
+        compute_batch(replace(work, program="rocking 9.9.9 (kernels 0)"))
 
 
 # The page
@@ -203,7 +203,7 @@ def test_the_commands_of_the_page_run_a_study_over_tls(complete, tmp_path, monke
         command = f"{settings}; exec {sys.executable} run.py"
         done = subprocess.run(command, shell=True, executable="/bin/bash", capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
-        assert "20 units" in done.stdout
+        assert "20 batches" in done.stdout
         # Who has no certificate is not let in.
         with pytest.raises(OSError), connected(f"tcp://127.0.0.1:{port}", timeout=0.5):
             pass

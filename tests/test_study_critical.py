@@ -16,7 +16,7 @@ OPTIONS = {"levels": SCALES, "measure": "pga", "polarity": "both", "model": "lin
 
 @pytest.fixture(scope="module")
 def complete(tmp_path_factory):
-    study = rocking.create_study(tmp_path_factory.mktemp("complete"), BLOCKS, MOTIONS, **OPTIONS, unit_blocks=512)
+    study = rocking.create_study(tmp_path_factory.mktemp("complete"), BLOCKS, MOTIONS, **OPTIONS, blocks_per_batch=512)
     study.run()
     return study
 
@@ -46,7 +46,7 @@ def as_rows(found, above, results):
 def test_changes_lie_between_neighbouring_scales_whose_verdicts_are_known(complete, tmp_path, verdict, above, duration):
     study = complete
     if duration is not None:
-        study = rocking.create_study(tmp_path, BLOCKS, MOTIONS, **OPTIONS, duration=duration, unit_blocks=512)
+        study = rocking.create_study(tmp_path, BLOCKS, MOTIONS, **OPTIONS, duration=duration, blocks_per_batch=512)
         study.run()
     found, results = study.critical_scales(verdict), study.results()
     known = ~(results.unfinished | results.stopped).values
@@ -89,7 +89,7 @@ def test_what_has_no_critical_scales_is_refused(complete, tmp_path):
             study.critical_scales()
     with pytest.raises(rocking.errors.OptionError, match="outcome must be one of overturning, complete_chattering"):
         complete.critical_scales("falling")
-    with pytest.raises(rocking.errors.StudyError, match="units are missing"):
+    with pytest.raises(rocking.errors.StudyError, match="batches are missing"):
         rocking.create_study(tmp_path / "new", BLOCKS, MOTIONS, **OPTIONS).critical_scales()
 
 

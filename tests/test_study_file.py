@@ -204,24 +204,24 @@ def test_unreadable_records_are_left_out_only_where_the_file_says_so(file, tmp_p
 
 def test_the_commands_go_from_a_file_to_results(run, file, tmp_path):
     folder, table = tmp_path / "kept", tmp_path / "all.csv"
-    code, out, err = run("study", "create", file, folder, "--unit-blocks", 512)
+    code, out, err = run("study", "create", file, folder, "--blocks-per-batch", 512)
     assert (code, err) == (0, "")
-    assert "0 of 20 units" in out
+    assert "0 of 20 batches" in out
     assert run("study", "run", folder)[0] == 0
-    assert run("study", "status", folder)[1].startswith(f"{folder}: 20 of 20 units done")
+    assert run("study", "status", folder)[1].startswith(f"{folder}: 20 of 20 batches done")
     assert json.loads(run("study", "status", folder, "--json")[1]) == {
         "folder": str(folder),
-        "done": 20,
-        "units": 20,
-        "simulations": 200,
+        "done_count": 20,
+        "batch_count": 20,
+        "simulation_count": 200,
     }
-    assert "20 of 20 units done and sound" in run("study", "verify", folder, "--recompute", 2)[1]
-    lost = max((folder / "units").glob("unit.*"))
-    unit = lost.read_bytes()
+    assert "20 of 20 batches done and sound" in run("study", "verify", folder, "--recompute", 2)[1]
+    lost = max((folder / "batches").glob("batch.*"))
+    batch = lost.read_bytes()
     lost.unlink()
     reported = run("study", "verify", folder)[1]
-    assert reported == "19 of 20 units done and sound\n"
-    lost.write_bytes(unit)
+    assert reported == "19 of 20 batches done and sound\n"
+    lost.write_bytes(batch)
     assert run("study", "export", folder, table)[0] == 0
     with table.open() as rows:
         pairs = {(row["record"], row["motion"]) for row in csv.DictReader(rows)}
@@ -232,15 +232,15 @@ def test_the_commands_go_from_a_file_to_results(run, file, tmp_path):
         product.blocks, product.motions, levels=[0.5, 1.0], polarity="both", model="linear", chattering="certified=1e-9"
     )
     np.testing.assert_array_equal(rocking.Study(folder).results().peak_rotation.values, reference.peak_rotation.values)
-    unit = folder / "units" / "unit.0.0.0.0"
-    unit.write_bytes(unit.read_bytes()[:-1])
+    batch = folder / "batches" / "batch.0.0.0.0"
+    batch.write_bytes(batch.read_bytes()[:-1])
     code, out, err = run("study", "verify", folder)
     assert code == 2
-    assert "unit.0.0.0.0 is damaged" in out
+    assert "batch.0.0.0.0 is damaged" in out
     assert err.count("\n") == 1
     code, _, err = run("study", "export", folder, tmp_path / "again.csv")
     assert code == 2
-    assert "unit.0.0.0.0 is damaged" in err and "rocking study verify FOLDER --repair computes it again" in err
+    assert "batch.0.0.0.0 is damaged" in err and "rocking study verify FOLDER --repair computes it again" in err
     assert "verify(" not in out + err
     assert "1 fault repaired" in run("study", "verify", folder, "--repair")[1]
     assert run("study", "verify", folder, "--recompute", "-1")[0] == 2
@@ -259,21 +259,19 @@ def test_a_study_names_its_records_as_its_file_does(file, tmp_path):
 
 
 def test_another_study_in_the_same_folder_is_refused(run, file, tmp_path):
-    run("study", "create", file, tmp_path / "kept", "--unit-blocks", 512)
+    run("study", "create", file, tmp_path / "kept", "--blocks-per-batch", 512)
     file.write_text(TEXT.replace("factor = [0.5, 1.0]", "factor = [0.5, 1.5]"))
     code, _, err = run("study", "create", file, tmp_path / "kept")
     assert code == 2
-    assert (
-        f"{tmp_path / 'kept'}: the folder contains a study of other inputs (scales/values changed), 0 of 20 units done"
-        in err
-    )
+    changed = "the folder contains a study of other inputs (scales/values changed), 0 of 20 batches done"
+    assert f"{tmp_path / 'kept'}: {changed}" in err
     assert "create this study elsewhere, or remove the other one" in err
 
 
 def test_a_folder_of_other_things_is_no_place_for_a_study(run, file, tmp_path):
     (tmp_path / "photos").mkdir()
     (tmp_path / "photos" / "a.jpg").touch()
-    code, out, err = run("study", "create", file, tmp_path / "photos", "--unit-blocks", 512)
+    code, out, err = run("study", "create", file, tmp_path / "photos", "--blocks-per-batch", 512)
     assert (code, out) == (2, "")
     assert f"{tmp_path / 'photos'}: the folder contains no study, but a.jpg: choose a new or empty folder" in err
     assert [path.name for path in (tmp_path / "photos").iterdir()] == ["a.jpg"]
@@ -462,15 +460,15 @@ def test_results_without_their_description_are_no_new_study(run, file, tmp_path)
     file.write_text(TEXT.replace("1:6:5", "2:9:5"))
     code, _, err = run("study", "create", file, tmp_path / "made")
     assert code == 2
-    assert "the folder contains no study, but units: choose a new" in err
+    assert "the folder contains no study, but batches: choose a new" in err
 
 
 def test_units_of_a_study_that_is_there_are_not_changed_without_a_word(run, file, tmp_path):
     file.write_text(TEXT.replace("1:6:5", "1:6:600"))
     for width, code in (("512", 0), ("512", 0), ("1024", 2)):
-        found, _, err = run("study", "create", file, tmp_path / "made", "--unit-blocks", width)
+        found, _, err = run("study", "create", file, tmp_path / "made", "--blocks-per-batch", width)
         assert found == code
-    assert "in units of 512 blocks: omit --unit-blocks" in err
+    assert "in batches of 512 blocks: omit --blocks-per-batch" in err
 
 
 @pytest.mark.thorough
@@ -497,8 +495,8 @@ def test_options_of_a_run_that_are_none_are_one_line(run, file, tmp_path, option
 
 def test_parts_of_a_study_are_run_by_commands_of_their_own_and_a_last_one_completes_it(run, file, tmp_path):
     made = tmp_path / "made"
-    assert run("study", "create", file, made, "--unit-blocks", 512)[0] == 0
+    assert run("study", "create", file, made, "--blocks-per-batch", 512)[0] == 0
     for part, done in (("2/3", 7), ("3/3", 13)):
-        assert f"{made}: {done} of 20 units done" in run("study", "run", made, "--part", part)[1]
-    assert "20 of 20 units done" in run("study", "run", made)[1]
-    assert run("study", "run", made, "--part", "1/3")[1].startswith("0 units, 0 simulations in ")
+        assert f"{made}: {done} of 20 batches done" in run("study", "run", made, "--part", part)[1]
+    assert "20 of 20 batches done" in run("study", "run", made)[1]
+    assert run("study", "run", made, "--part", "1/3")[1].startswith("0 batches, 0 simulations in ")

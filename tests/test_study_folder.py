@@ -30,9 +30,9 @@ def test_a_file_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr(os, "fsync", flush)
     monkeypatch.setattr(Path, "replace", name)
-    write_atomically(tmp_path / "unit.1", b"outcomes")
+    write_atomically(tmp_path / "batch.1", b"outcomes")
     assert done == [len(b"outcomes"), "name", "folder"]
-    assert (tmp_path / "unit.1").read_bytes() == b"outcomes"
+    assert (tmp_path / "batch.1").read_bytes() == b"outcomes"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="there the folder decides who may read its files")
@@ -40,12 +40,12 @@ def test_a_file_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatc
 def test_the_umask_decides_who_may_read_a_study(tmp_path: Path, umask: int, mode: int) -> None:
     before = os.umask(umask)
     try:
-        write_atomically(tmp_path / "unit.1", b"outcomes")
+        write_atomically(tmp_path / "batch.1", b"outcomes")
         with lock_folder(tmp_path):
             pass
     finally:
         os.umask(before)
-    assert [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("unit.1", "lock")] == [mode, mode]
+    assert [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("batch.1", "lock")] == [mode, mode]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="parts share no lock there")
@@ -104,6 +104,6 @@ def test_a_folder_of_other_files_is_no_place_for_a_study(tmp_path: Path, names: 
 @pytest.mark.parametrize("part", ["0/3", "4/3", "1", "1/", "/3", "a/b", "-1/3", "1/0", "1.5/3", 3])
 def test_a_part_that_is_none_is_refused(tmp_path: Path, part: str) -> None:
     motion, blocks = rocking.pulses.one_sine(4.0, 1.0), rocking.Blocks([1.0, 2.0], 0.2, 0.9)
-    study = rocking.create_study(tmp_path, blocks, motion, unit_blocks=512)
+    study = rocking.create_study(tmp_path, blocks, motion, blocks_per_batch=512)
     with pytest.raises(OptionError, match="part must be the number of a part"):
         study.run(part=part)

@@ -35,7 +35,7 @@ pga = "1:9:8"
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     made = rocking.create_study(
-        tmp_path_factory.mktemp("study"), BLOCKS, MOTIONS, levels=LEVELS, measure="pga", unit_blocks=512
+        tmp_path_factory.mktemp("study"), BLOCKS, MOTIONS, levels=LEVELS, measure="pga", blocks_per_batch=512
     )
     made.run()
     return made
@@ -132,7 +132,9 @@ def test_a_study_of_one_block_says_what_a_fragility_at_once_does(tmp_path, alpha
     block = rocking.Block.from_parameters(p=2.0, alpha=alpha, restitution=0.9)
     motions = [motion.with_vertical(lift) for motion in MOTIONS[:6]]
     levels = np.linspace(1.0, 9.0, 9)
-    of_study = rocking.create_study(tmp_path / "s", block, motions, levels=levels, polarity="both", unit_blocks=512)
+    of_study = rocking.create_study(
+        tmp_path / "s", block, motions, levels=levels, polarity="both", blocks_per_batch=512
+    )
     of_study.run()
     found, reference = of_study.fragility(), rocking.fragility(block, motions, levels=levels, polarity="both")
     assert found.description.partition(" model, ")[2] == reference.description.partition(" model, ")[2] != ""
@@ -153,7 +155,7 @@ def test_a_spectrum_is_the_fractiles_of_the_simulations(study, simulated):
 def test_what_is_written_of_spectral_accelerations_says_their_period_and_damping(tmp_path):
     measure, about = rocking.Measure("sa", 0.7, 0.02), {"measure": "sa", "period": 0.7, "damping": 0.02}
     made = rocking.create_study(
-        tmp_path / "study", BLOCKS, MOTIONS[:2], levels=[1.0, 2.0], measure=measure, unit_blocks=512
+        tmp_path / "study", BLOCKS, MOTIONS[:2], levels=[1.0, 2.0], measure=measure, blocks_per_batch=512
     )
     with rocking.set_options(threads=1):
         made.run()
@@ -173,7 +175,7 @@ def test_what_is_read_in_small_parts_is_the_same(study, curves, monkeypatch):
 @pytest.mark.thorough
 def test_both_polarities_of_symmetric_blocks_are_one_outcome(curves, tmp_path):
     both = rocking.create_study(
-        tmp_path, BLOCKS, MOTIONS, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512
+        tmp_path, BLOCKS, MOTIONS, levels=LEVELS, measure="pga", polarity="both", blocks_per_batch=512
     )
     both.run()
     assert both.block_fragilities(limit_states=LIMITS).data.identical(curves.data)
@@ -183,7 +185,7 @@ def test_both_polarities_of_asymmetric_blocks_are_two_trials(tmp_path):
     blocks = rocking.Blocks(p=[1.5, 2.0, 3.0], alpha=[[0.1, 0.15], [0.2, 0.15], [0.2, 0.3]], restitution=0.9)
     motions = MOTIONS[::2]
     study = rocking.create_study(
-        tmp_path, blocks, motions, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512
+        tmp_path, blocks, motions, levels=LEVELS, measure="pga", polarity="both", blocks_per_batch=512
     )
     study.run()
     of_study = study.fragility(limit_states=LIMITS)
@@ -200,7 +202,7 @@ def test_both_polarities_of_asymmetric_blocks_are_two_trials(tmp_path):
 def test_outcomes_are_counted_for_each_block_by_its_own_polarities(tmp_path, order):
     blocks = rocking.Blocks(p=2.0, alpha=[[0.2, 0.2], [0.2, 0.15]], restitution=0.9).select(np.array(order))
     study = rocking.create_study(
-        tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512
+        tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", polarity="both", blocks_per_batch=512
     )
     study.run()
     found, once = study.block_fragilities(), len(MOTIONS) * len(LEVELS)
@@ -209,7 +211,7 @@ def test_outcomes_are_counted_for_each_block_by_its_own_polarities(tmp_path, ord
 
 def test_a_block_that_no_curve_fits_says_why(tmp_path):
     blocks = rocking.Blocks(p=[2.0, 2.0], alpha=[0.2, 1.2], restitution=[0.9, 0.9])
-    study = rocking.create_study(tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", unit_blocks=512)
+    study = rocking.create_study(tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", blocks_per_batch=512)
     study.run()
     found = study.block_fragilities()
     assert found.data.fault.values[0, 0] == ""
@@ -233,8 +235,8 @@ def test_wrong_options_of_a_report_are_refused(study, run, tmp_path):
 
 
 def test_a_study_that_is_not_complete_has_no_report(tmp_path):
-    study = rocking.create_study(tmp_path, BLOCKS, MOTIONS, levels=LEVELS, measure="pga", unit_blocks=512)
-    with pytest.raises(rocking.errors.StudyError, match="72 of 72 units are missing"):
+    study = rocking.create_study(tmp_path, BLOCKS, MOTIONS, levels=LEVELS, measure="pga", blocks_per_batch=512)
+    with pytest.raises(rocking.errors.StudyError, match="72 of 72 batches are missing"):
         study.fragility()
 
 
@@ -244,7 +246,7 @@ def test_two_commands_go_from_a_file_to_fragility_curves(run, tmp_path):
     file.write_text(TEXT)
     code, out, _ = run("study", "run", file)
     assert code == 0
-    assert re.search(r"(\d+) of \1 units done", out)
+    assert re.search(r"(\d+) of \1 batches done", out)
     code, out, err = run("study", "report", tmp_path / "museum", "--limit-states", "overturning,half=0.5")
     assert (code, err) == (0, "")
     assert "fragility of 6 blocks; intensity: peak ground acceleration" in out

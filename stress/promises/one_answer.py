@@ -1,7 +1,7 @@
 """The same outcomes, bit for bit, however an ensemble is computed.
 
 An ensemble of many blocks under a record is computed with 1, 2 and 7 threads, in batches of several sizes, and in
-shuffled order; as a study in units of several sizes, and some also by processes. For one ensemble kernels are compiled
+shuffled order; as a study in batches of several sizes, and some by processes. For one ensemble kernels are compiled
 by numba in the process itself, and taken from the library of each level of the processor. Digests of all outcomes are
 compared, sorted as the blocks were given.
 """
@@ -26,7 +26,7 @@ import rocking
 from promises.promise import Found, Promise
 from rocking.kernels import library
 
-#: Blocks of an ensemble: three units of the smallest size of a study.
+#: Blocks of an ensemble: three batches of the smallest size of a study.
 BLOCKS = 1100
 
 #: Ensembles whose studies are run by processes, too, and the one for which kernels come from elsewhere, too.
@@ -91,11 +91,11 @@ def rearranged(part: int, batch: int, *, shuffled: bool) -> str:
     return digest({name: values[np.argsort(order)] for name, values in whole.items()})
 
 
-def as_study(part: int, unit_blocks: int, processes: int = 0) -> str:
-    """Digest of the ensemble as a study, in units of so many blocks, by a thread or by processes."""
+def as_study(part: int, blocks_per_batch: int, processes: int = 0) -> str:
+    """Digest of the ensemble as a study, in batches of so many blocks, by a thread or by processes."""
     blocks, motion, model = drawn(part)
     with tempfile.TemporaryDirectory() as folder:
-        made = rocking.create_study(folder, blocks, motion, model=model, unit_blocks=unit_blocks)  # type: ignore[arg-type]
+        made = rocking.create_study(folder, blocks, motion, model=model, blocks_per_batch=blocks_per_batch)  # type: ignore[arg-type]
         if processes:
             with ProcessPoolExecutor(processes, get_context("spawn")) as executor:
                 made.run(executor=executor)
@@ -133,8 +133,8 @@ WAYS: dict[str, Callable[[int], str]] = {
     "batches of 7, shuffled": lambda part: rearranged(part, 7, shuffled=True),
     "batches of 64, shuffled": lambda part: rearranged(part, 64, shuffled=True),
     "whole, shuffled": lambda part: rearranged(part, BLOCKS, shuffled=True),
-    "a study in units of 512": lambda part: as_study(part, 512),
-    "a study in units of 1024": lambda part: as_study(part, 1024),
+    "a study in batches of 512": lambda part: as_study(part, 512),
+    "a study in batches of 1024": lambda part: as_study(part, 1024),
 }
 
 

@@ -34,7 +34,7 @@ from rocking.studies.study import Study, open_or_create
 
 app = App(name="study")
 
-#: Maximum number of failed units that are named.
+#: Maximum number of failed batches that are named.
 _MAX_REPORTED: Final = 5
 
 #: Writers of a study, by the suffix of the file.
@@ -61,7 +61,7 @@ def create(
     file: Path,
     folder: str,
     *,
-    unit_blocks: Annotated[int | None, READ_INTEGER] = None,
+    blocks_per_batch: Annotated[int | None, READ_INTEGER] = None,
     output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
     """Create the study of a file in a folder; if the folder exists, check that it contains the same study.
@@ -72,11 +72,11 @@ def create(
         TOML file, as created by `rocking study new`.
     folder
         Folder of the study.
-    unit_blocks
-        Number of blocks in a unit (one motion and scale), a multiple of 512. By default a unit runs for about five
+    blocks_per_batch
+        Number of blocks in a batch (one motion and scale), a multiple of 512. By default a batch runs for about five
         seconds.
     """
-    print(f"{folder}: {_create_study(file, folder, unit_blocks).status}; next: rocking study run {folder}")
+    print(f"{folder}: {_create_study(file, folder, blocks_per_batch).status}; next: rocking study run {folder}")
 
 
 @app.command
@@ -88,7 +88,7 @@ def run(
     part: str | None = None,
     output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
-    """Compute the missing units; after Ctrl-C, SIGTERM or any other interruption, run it again to continue.
+    """Compute the missing batches; after Ctrl-C, SIGTERM or any other interruption, run it again to continue.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def run(
     threads
         Number of threads, by default one for every core.
     part
-        Fixed share of the units to compute, as 3/10. Shares may run at the same time, as an array of jobs.
+        Fixed share of the batches to compute, as 3/10. Shares may run at the same time, as an array of jobs.
     """
     if into is not None and not folder.endswith(".toml"):
         raise OptionError(f"{into} is only allowed with a TOML file, which {folder} is not; pass one folder only")
@@ -108,11 +108,11 @@ def run(
     with set_options(threads=threads):
         report = study.run(part=part)
     print(f"{report}\n{study.folder}: {study.status}")
-    for unit, message in [*report.failed.items()][:_MAX_REPORTED]:
-        note(f"{unit} failed: {message}")
+    for batch, message in [*report.failed.items()][:_MAX_REPORTED]:
+        note(f"{batch} failed: {message}")
     if report.failed:
-        raise StudyError(f"{format_count(len(report.failed), 'unit')} failed; run the study again to repeat them")
-    if report.stopped:
+        raise StudyError(f"{format_count(len(report.failed), 'batch')} failed; run the study again to repeat them")
+    if report.ended_early:
         sys.exit(128 + signal.SIGTERM)
 
 
@@ -137,25 +137,25 @@ def verify(
     repair: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
-    """Read and check every unit, recompute some units and compare all bits.
+    """Read and check every batch, recompute some batches and compare all bits.
 
     Parameters
     ----------
     folder
         Folder of the study.
     recompute
-        Number of units, drawn at random, to compute again.
+        Number of batches, drawn at random, to compute again.
     repair
-        Recompute damaged units and store them.
+        Recompute damaged batches and store them.
     """
     study = Study(folder)
     faults = study.verify(recompute, repair=repair)
     for fault in faults:
         print(fault)
     if faults and not repair:
-        raise StudyError(f"{format_count(len(faults), 'fault')} found; {{}} computes damaged units again", "repair")
+        raise StudyError(f"{format_count(len(faults), 'fault')} found; {{}} computes damaged batches again", "repair")
     status, repaired = study.status, f"; {format_count(len(faults), 'fault')} repaired" if faults else ""
-    print(f"{status.done} of {format_count(status.units, 'unit')} done and sound{repaired}")
+    print(f"{status.done_count} of {format_count(status.batch_count, 'batch')} done and sound{repaired}")
 
 
 @app.command
@@ -174,7 +174,7 @@ def export(
         Folder of the study.
     file
         NetCDF (.nc), or a table with a row for each simulation: CSV (.csv) or Parquet (.parquet); its column names
-        contain the units.
+        contain the batches.
     critical
         Write the scales between which this outcome of a block changes instead.
     """
@@ -238,8 +238,8 @@ def report(
         print_result(result, "\n\n".join(analysis.summary() for analysis in results.values()), as_json=output.as_json)
 
 
-def _create_study(file: Path, folder: str, unit_blocks: int | None) -> Study:
+def _create_study(file: Path, folder: str, blocks_per_batch: int | None) -> Study:
     study_file = read_study(file)
     for sentence in study_file.skipped:
         note(f"left out: {sentence}")
-    return open_or_create(folder, study_file.product, unit_blocks, study_file.records)
+    return open_or_create(folder, study_file.product, blocks_per_batch, study_file.records)

@@ -97,7 +97,8 @@ def format_count(number: float, noun: str) -> str:
     if number == 1:
         return f"1 {noun}"
     text = f"{number:g}" if isinstance(number, float) else f"{number}"
-    return f"{text} {noun[:-1]}ies" if noun.endswith("y") else f"{text} {noun}s"
+    plural = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}es" if noun.endswith("ch") else f"{noun}s"
+    return f"{text} {plural}"
 
 
 def list_some(names: Sequence[str], most: int = 5) -> str:

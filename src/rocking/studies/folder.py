@@ -1,4 +1,4 @@
-"""Folder of a study: inputs and units in atomically written files, and a lock."""
+"""Folder of a study: inputs and batches in atomically written files, and a lock."""
 
 from __future__ import annotations
 
@@ -28,7 +28,17 @@ from rocking.motion.description import Description
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.simulation.ensemble import ScalingLevels, SimulationProduct, create_setup
-from rocking.studies.units import OUTCOMES, Key, UnitGrid, UnitInput, decode, format_key, identify_program, seal, unseal
+from rocking.studies.batches import (
+    OUTCOMES,
+    BatchGrid,
+    BatchInput,
+    Key,
+    decode,
+    format_key,
+    identify_program,
+    seal,
+    unseal,
+)
 
 if sys.platform == "win32":
     import msvcrt
@@ -48,12 +58,12 @@ else:
 _INPUT_FILE: Final = "study.npz"
 _FORMAT_VERSION: Final = 4
 
-#: Folder of the units, inside the folder of the study.
-_UNIT_FOLDER: Final = "units"
+#: Folder of the batches, inside the folder of the study.
+_BATCH_FOLDER: Final = "batches"
 
 
 class Store:
-    """Outcomes of a product in a folder, in units of a grid; a unit is done if its file exists."""
+    """Outcomes of a product in a folder, in batches of a grid; a batch is done if its file exists."""
 
     def __init__(self, path: str | Path) -> None:
         self.folder = check_folder(path)
@@ -74,13 +84,20 @@ class Store:
         #: Record name of each motion, empty for a pulse; an empty sequence if unknown.
         self.records: tuple[str, ...] = tuple(header["records"])
         self.product = _product_from_arrays(self.inputs)
-        self.grid = UnitGrid(self.product.shape, tuple(header["unit"]))
-        self._factors = functools.lru_cache(1)(self._compute_factors)  # neighbouring units share their motions
+        self.grid = BatchGrid(self.product.shape, tuple(header["batch_shape"]))
+        self._factors = functools.lru_cache(1)(self._compute_factors)  # neighbouring batches share their motions
 
     @staticmethod
-    def create(path: str | Path, product: SimulationProduct, unit: Sequence[int], records: Sequence[str]) -> None:
+    def create(
+        path: str | Path, product: SimulationProduct, batch_shape: Sequence[int], records: Sequence[str]
+    ) -> None:
         """Write a new store into an empty folder."""
-        header = {"format": _FORMAT_VERSION, "program": identify_program(), "unit": unit, "records": records}
+        header = {
+            "format": _FORMAT_VERSION,
+            "program": identify_program(),
+            "batch_shape": batch_shape,
+            "records": records,
+        }
         arrays: dict[str, Any] = _product_to_arrays(product) | {"about": np.array(json.dumps(header))}
         buffer = io.BytesIO()
         np.savez_compressed(buffer, **arrays)
@@ -100,50 +117,50 @@ class Store:
         changed = [name for name in stored | new if stored.get(name) != new.get(name)]
         if changed:
             parts = dict.fromkeys("/".join(name.split("/")[:2]) for name in changed)
-            progress = f"{len(self.find_done())} of {format_count(len(self.grid), 'unit')} done"
+            progress = f"{len(self.find_done())} of {format_count(len(self.grid), 'batch')} done"
             message = f"the folder contains a study of other inputs ({_format_some(parts)} changed), {progress}"
             message += ": create this study elsewhere, or remove the other one"
             raise StudyError(message, path=str(self.folder))
 
-    def unit_path(self, key: Key) -> Path:
-        """Return the file of a unit."""
-        return self.folder / _UNIT_FOLDER / format_key(key)
+    def batch_path(self, key: Key) -> Path:
+        """Return the file of a batch."""
+        return self.folder / _BATCH_FOLDER / format_key(key)
 
     def find_done(self) -> set[Key]:
-        """Return the keys of the units that are done."""
-        with contextlib.suppress(FileNotFoundError), os.scandir(self.folder / _UNIT_FOLDER) as entries:
+        """Return the keys of the batches that are done."""
+        with contextlib.suppress(FileNotFoundError), os.scandir(self.folder / _BATCH_FOLDER) as entries:
             names = {entry.name for entry in entries}
             return {key for key in self.grid if format_key(key) in names}
         return set()
 
     def require_complete(self) -> None:
-        """Raise a StudyError if units are missing."""
+        """Raise a StudyError if batches are missing."""
         missing = len(self.grid) - len(self.find_done())
         if missing:
-            message = f"{missing} of {len(self.grid)} units are missing; complete the study first"
+            message = f"{missing} of {len(self.grid)} batches are missing; complete the study first"
             raise StudyError(message, path=str(self.folder))
 
     def read_outcomes(self, key: Key) -> Mapping[str, Floats] | None:
-        """Return the outcomes of a full unit by name, or None; raise a StudyError if it is damaged."""
-        data = read_bytes(self.unit_path(key))
+        """Return the outcomes of a full batch by name, or None; raise a StudyError if it is damaged."""
+        data = read_bytes(self.batch_path(key))
         if data is None:
             return None
-        values = decode(data, self.grid.unit_shape)
+        values = decode(data, self.grid.batch_shape)
         if values is None:
-            raise DamagedStudyError(f"unit {format_key(key)} is damaged")
+            raise DamagedStudyError(f"batch {format_key(key)} is damaged")
         return dict(zip(OUTCOMES, values, strict=True))
 
-    def create_input(self, key: Key) -> UnitInput:
-        """Create the complete input of a worker for a unit."""
+    def create_input(self, key: Key) -> BatchInput:
+        """Create the complete input of a worker for a batch."""
         motions, scales, polarities, blocks = self.grid.ranges(key)
         factors = self._factors(key[0])[:, scales, polarities]
-        return UnitInput(
-            create_setup(self.product, blocks), self.product.motions[motions], factors, self.grid.unit_shape
+        return BatchInput(
+            create_setup(self.product, blocks), self.product.motions[motions], factors, self.grid.batch_shape
         )
 
-    def _compute_factors(self, unit: int) -> Floats:
-        """Return the factors on the motions of a unit, shape (motions, scales, polarities)."""
-        motions = self.product.motions[self.grid.ranges((unit, 0, 0, 0))[0]]
+    def _compute_factors(self, batch: int) -> Floats:
+        """Return the factors on the motions of a batch, shape (motions, scales, polarities)."""
+        motions = self.product.motions[self.grid.ranges((batch, 0, 0, 0))[0]]
         factors = np.array([self.product.scales.factors(motion) for motion in motions])
         return factors[:, :, None] * np.array(self.product.signs, dtype=np.float64)
 

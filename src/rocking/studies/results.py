@@ -58,8 +58,8 @@ from rocking.simulation.ensemble import (
     find_labels,
     list_block_names,
 )
+from rocking.studies.batches import OUTCOMES, format_key
 from rocking.studies.folder import Store
-from rocking.studies.units import OUTCOMES, format_key
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -79,7 +79,7 @@ StudyOutcome = Literal["overturning", "complete_chattering"]
 
 
 def open_results(store: Store) -> xr.Dataset:
-    """Return the outcomes so far, read lazily; if units are missing, variables are floats, with NaN for those units."""
+    """Return the outcomes so far, read lazily; variables are floats, NaN where batches are missing."""
     done, grid = store.find_done(), store.grid
     complete = len(done) == len(grid)
     outcomes: dict[str, Any] = {name: _create_lazy_outcome(store, name, complete) for name in OUTCOMES}
@@ -105,7 +105,7 @@ def _create_lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable
         return values.astype(OUTCOME_DTYPE[name]) if complete else values
 
     class Outcome(BackendArray):
-        """Lazy array that reads the selected units."""
+        """Lazy array that reads the selected batches."""
 
         shape = store.grid.shape
         dtype = OUTCOME_DTYPE[name] if complete else np.dtype(np.float64)
@@ -119,23 +119,23 @@ def _create_lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable
 
 
 def _read_selection(store: Store, names: Sequence[str], complete: bool, key: _Selection) -> list[Floats]:
-    """Read a selection of outcomes, with NaN for missing units."""
+    """Read a selection of outcomes, with NaN for missing batches."""
     grid = store.grid
     axes = [np.arange(size)[part] for size, part in zip(grid.shape, key, strict=True)]
     indices = [np.atleast_1d(axis) for axis in axes]
     selection = np.full([len(names), *map(len, indices)], np.nan)
-    units = [np.unique(axis // part).tolist() for axis, part in zip(indices, grid.unit_shape, strict=True)]
-    for unit in itertools.product(*units):
+    batches = [np.unique(axis // part).tolist() for axis, part in zip(indices, grid.batch_shape, strict=True)]
+    for batch in itertools.product(*batches):
         targets = [
-            np.flatnonzero(axis // part == k) for axis, part, k in zip(indices, grid.unit_shape, unit, strict=True)
+            np.flatnonzero(axis // part == k) for axis, part, k in zip(indices, grid.batch_shape, batch, strict=True)
         ]
-        sources = [axis[target] % part for axis, target, part in zip(indices, targets, grid.unit_shape, strict=True)]
-        outcomes = store.read_outcomes(unit)
+        sources = [axis[target] % part for axis, target, part in zip(indices, targets, grid.batch_shape, strict=True)]
+        outcomes = store.read_outcomes(batch)
         if outcomes is not None:
             for values, name in zip(selection, names, strict=True):
                 values[np.ix_(*targets)] = outcomes[name][np.ix_(*sources)]
         elif complete:
-            event = f"unit {format_key(unit)} was removed after these results were opened"
+            event = f"batch {format_key(batch)} was removed after these results were opened"
             raise StudyError(f"{event}: run the study again")
     single = tuple(position for position, axis in enumerate(axes) if axis.ndim == 0)
     return [values.squeeze(axis=single) for values in selection]
@@ -194,7 +194,7 @@ def find_critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     store.require_complete()
     names = ["unfinished", "stopped", "overturned", "complete_chattering", "rests", "rests_by_rounding"]
     has_outcome, is_known = np.empty(store.grid.shape, bool), np.empty(store.grid.shape, bool)
-    for part in split_range(len(product.motions), store.grid.unit_shape[0]):
+    for part in split_range(len(product.motions), store.grid.batch_shape[0]):
         outcomes = _read_selection(store, names, True, (part, _ALL, _ALL, _ALL))
         unfinished, stopped, overturned, completes, rests, rests_by_rounding = (values != 0.0 for values in outcomes)
         has_outcome[part], is_known[part] = overturned, ~(unfinished | stopped)

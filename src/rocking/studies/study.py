@@ -37,6 +37,7 @@ from rocking.errors import OptionError, RockingError, StudyError
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
 from rocking.records.named import Motions
 from rocking.simulation.ensemble import Polarity, SimulationProduct, create_product
+from rocking.studies.batches import BatchInput, Key, choose_batch_shape, compute_batch, format_key
 from rocking.studies.folder import Store, contains_study, lock_folder, read_bytes, require_empty, write_atomically
 from rocking.studies.results import (
     BlockTable,
@@ -48,7 +49,6 @@ from rocking.studies.results import (
     open_results,
     write_table,
 )
-from rocking.studies.units import Key, UnitInput, choose_unit_shape, compute_unit, format_key
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,8 +60,8 @@ class Status:
 
     Attributes
     ----------
-    done, units, simulations : int
-        Number of finished units, of all units, and of simulations.
+    done_count, batch_count, simulation_count : int
+        Number of finished batches, of all batches, and of simulations.
 
     See Also
     --------
@@ -73,23 +73,23 @@ class Status:
     >>> import rocking, tempfile
     >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
     >>> status = rocking.create_study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0]).status
-    >>> status.done, status.units, status.is_complete
+    >>> status.done_count, status.batch_count, status.is_complete
     (0, 2, False)
     """
 
-    done: int
-    units: int
-    simulations: int
+    done_count: int
+    batch_count: int
+    simulation_count: int
 
     @property
     def is_complete(self) -> bool:
-        """Whether every unit is done."""
-        return self.done == self.units
+        """Whether every batch is done."""
+        return self.done_count == self.batch_count
 
     def __str__(self) -> str:
-        share = int(1000 * self.done / self.units) / 10  # rounded down, so that 100 % means all
-        done = f"{self.done} of {format_count(self.units, 'unit')} done ({share:.1f} %)"
-        return f"{done}, {format_count(self.simulations, 'simulation')} in all"
+        share = int(1000 * self.done_count / self.batch_count) / 10  # rounded down, so that 100 % means all
+        done = f"{self.done_count} of {format_count(self.batch_count, 'batch')} done ({share:.1f} %)"
+        return f"{done}, {format_count(self.simulation_count, 'simulation')} in all"
 
 
 @dataclass(frozen=True)
@@ -98,18 +98,18 @@ class RunReport:
 
     Attributes
     ----------
-    units, simulations : int
-        Number of computed units and simulations.
+    batch_count, simulation_count : int
+        Number of computed batches and simulations.
     seconds : float
         Duration of the run, s.
     failed : mapping
-        Sentence for each unit that could not be computed, by its name.
-    stopped : bool
-        Whether SIGTERM stopped the run before all units were done.
+        Sentence for each batch that could not be computed, by its name.
+    ended_early : bool
+        Whether SIGTERM stopped the run before all batches were done.
 
     See Also
     --------
-    rocking.Study.run : Simulate the units that are not done.
+    rocking.Study.run : Simulate the batches that are not done.
     rocking.studies.Status : Report the progress of a study.
 
     Examples
@@ -117,23 +117,23 @@ class RunReport:
     >>> import rocking, tempfile
     >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
     >>> report = rocking.create_study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0]).run()
-    >>> report.units, report.simulations, report.stopped
+    >>> report.batch_count, report.simulation_count, report.ended_early
     (2, 2, False)
     """
 
-    units: int
-    simulations: int
+    batch_count: int
+    simulation_count: int
     seconds: float
     failed: dict[str, str]
-    stopped: bool
+    ended_early: bool
 
     def __str__(self) -> str:
-        rate = self.simulations / self.seconds if self.seconds > 0.0 else 0.0
-        done = f"{format_count(self.units, 'unit')}, {format_count(self.simulations, 'simulation')}"
+        rate = self.simulation_count / self.seconds if self.seconds > 0.0 else 0.0
+        done = f"{format_count(self.batch_count, 'batch')}, {format_count(self.simulation_count, 'simulation')}"
         text = f"{done} in {self.seconds:.1f} s ({rate:.3g} a second)"
         if self.failed:
-            text += f"; {format_count(len(self.failed), 'unit')} failed, the first: {next(iter(self.failed.values()))}"
-        return text + ("; stopped, run again to continue" if self.stopped else "")
+            text += f"; {format_count(len(self.failed), 'batch')} failed, the first: {next(iter(self.failed.values()))}"
+        return text + ("; stopped, run again to continue" if self.ended_early else "")
 
 
 class Study:
@@ -160,7 +160,7 @@ class Study:
     --------
     >>> import pathlib, rocking, tempfile
     >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
-    >>> study = rocking.create_study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
+    >>> study = rocking.create_study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], blocks_per_batch=512)
     >>> _ = study.run()
     >>> table = pathlib.Path(tempfile.mkdtemp(), "all.csv")
     >>> study.to_csv(table)
@@ -179,20 +179,20 @@ class Study:
         return Status(len(self._store.find_done()), len(self._store.grid), int(np.prod(self._store.grid.shape)))
 
     def run(self, executor: Executor | Any = None, *, part: str | None = None) -> RunReport:
-        """Compute every unit that is not done.
+        """Compute every batch that is not done.
 
         Parameters
         ----------
         executor : concurrent.futures.Executor or dask.distributed.Client, optional
             Pool of processes or cluster client that computes instead; only this process writes.
         part : str, optional
-            Fixed share of the units, for example "3/10", the third of ten. Different shares may run at the same time,
-            on machines with a common file system; a run without a part then computes the missing units.
+            Fixed share of the batches, for example "3/10", the third of ten. Different shares may run at the same time,
+            on machines with a common file system; a run without a part then computes the missing batches.
 
         Returns
         -------
         RunReport
-            Computed units. SIGTERM ends the run after the current units, Ctrl-C at once; stored units are kept.
+            Computed batches. SIGTERM ends the run after the current batches, Ctrl-C at once; stored batches are kept.
 
         Raises
         ------
@@ -201,43 +201,43 @@ class Study:
         StudyError
             If another process runs the study, another version created it, or the workers are gone.
         OutputError
-            If a unit cannot be written.
+            If a batch cannot be written.
         """
         first, step = (1, 1) if part is None else _parse_part(part)
         self._store.check_program()
         with lock_folder(self.folder, shared=part is not None):
             share = [*itertools.islice(self._store.grid, first - 1, None, step)]
-            return _run_units(self._store, share, executor)
+            return _run_batches(self._store, share, executor)
 
     def results(self) -> xr.Dataset:
         """Return the outcomes so far as `simulate_many` does, read lazily from the folder.
 
-        While units are missing, every variable is of floats with NaN for missing units, and a variable ``done`` marks
-        available ones. Reading a damaged unit raises a StudyError that names it.
+        While batches are missing, every variable is of floats with NaN for missing batches. A variable ``done`` marks
+        the available ones. Reading a damaged batch raises a StudyError that names it.
         """
         return open_results(self._store)
 
     def verify(self, recompute: int = 0, *, repair: bool = False, seed: int = 0) -> list[str]:
-        """Read and check every unit, and recompute some units bit for bit.
+        """Read and check every batch, and recompute some batches bit for bit.
 
         Parameters
         ----------
         recompute : int
-            Number of units, drawn at random, to compute again.
+            Number of batches, drawn at random, to compute again.
         repair : bool
-            Whether to compute damaged units again and store them.
+            Whether to compute damaged batches again and store them.
         seed : int
             Seed of the draw.
 
         Returns
         -------
         list of str
-            A sentence for each unit that is damaged or differs; empty if there are none.
+            A sentence for each batch that is damaged or differs; empty if there are none.
 
         Raises
         ------
         StudyError
-            If another version created the study whose units are to be computed again.
+            If another version created the study whose batches are to be computed again.
         """
         store, faults = self._store, dict[Key, str]()
         if checks.integer(recompute, "recompute", OptionError, 0) or repair:
@@ -248,15 +248,15 @@ class Study:
             for k, key in enumerate(done):
                 try:
                     store.read_outcomes(key)
-                    if k in recomputed and compute_unit(store.create_input(key)) != read_bytes(store.unit_path(key)):
-                        faults[key] = f"unit {format_key(key)} differs from the result of this program"
+                    if k in recomputed and compute_batch(store.create_input(key)) != read_bytes(store.batch_path(key)):
+                        faults[key] = f"batch {format_key(key)} differs from the result of this program"
                 except StudyError as error:
                     faults[key] = error.text()
                 bar.advance()
         if repair and faults:
             with lock_folder(self.folder):
                 for key in faults:
-                    write_atomically(store.unit_path(key), compute_unit(store.create_input(key)))
+                    write_atomically(store.batch_path(key), compute_batch(store.create_input(key)))
         return [*faults.values()]
 
     def critical_scales(self, outcome: StudyOutcome = "overturning") -> xr.Dataset:
@@ -279,7 +279,7 @@ class Study:
         Raises
         ------
         StudyError
-            If units are missing or damaged.
+            If batches are missing or damaged.
         OptionError
             If `outcome` is unknown, or the study has fewer than two scales in increasing order.
         """
@@ -297,7 +297,7 @@ class Study:
     ) -> Fragility:
         """Fit fragility curves to the outcomes of all blocks, with the arguments and results of `rocking.fragility`.
 
-        The intensity is the measure of a motion at a scale. A StudyError is raised if units are missing or damaged.
+        The intensity is the measure of a motion at a scale. A StudyError is raised if batches are missing or damaged.
         """
         parsed = Measure.parse(measure)
         return fit_pooled_fragility(self._store, parsed, limit_states, confidence, weights, clusters, larger=larger)
@@ -337,7 +337,7 @@ class Study:
         Raises
         ------
         StudyError
-            If units are missing or damaged.
+            If batches are missing or damaged.
         OptionError
             If a fractile is out of its range.
         """
@@ -362,7 +362,7 @@ class Study:
         OutputError
             If the file cannot be written.
         StudyError
-            If a unit is damaged, or units are missing for critical scales.
+            If a batch is damaged, or batches are missing for critical scales.
         """
         self._write("csv", path, critical)
 
@@ -372,7 +372,7 @@ class Study:
 
     def _write(self, kind: str, path: str | Path, critical: StudyOutcome | None) -> None:
         dataset = self.critical_scales(critical) if critical else self.results()
-        write_table(kind, path, dataset, 1 << 16 if critical else self._store.grid.unit_shape[0])
+        write_table(kind, path, dataset, 1 << 16 if critical else self._store.grid.batch_shape[0])
 
     def __repr__(self) -> str:
         names = ("motion", "scale", "polarity", "block")
@@ -392,7 +392,7 @@ def create_study(
     polarity: Polarity = "+",
     duration: float | None = None,
     friction: Friction | None = None,
-    unit_blocks: int | None = None,
+    blocks_per_batch: int | None = None,
 ) -> Study:
     """Create a study, or open an existing one with the same inputs.
 
@@ -404,14 +404,14 @@ def create_study(
         As for `simulate_many`.
     model, chattering, levels, measure, polarity, duration, friction : optional
         As for `simulate_many`; the study stores no slips.
-    unit_blocks : int, optional
-        Number of blocks in a unit (one motion, scale and polarity), a multiple of 512. By default a unit contains as
+    blocks_per_batch : int, optional
+        Number of blocks in a batch (one motion, scale and polarity), a multiple of 512. By default a batch contains as
         many blocks, motions, scales and polarities as run for about five seconds, estimated by a pilot run.
 
     Returns
     -------
     Study
-        ``.run()`` computes missing units, ``.results()`` reads the stored ones.
+        ``.run()`` computes missing batches, ``.results()`` reads the stored ones.
 
     Raises
     ------
@@ -430,29 +430,31 @@ def create_study(
     >>> import rocking, tempfile
     >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
     >>> folder, pulse = tempfile.mkdtemp(), rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-    >>> _ = create_study(folder, blocks, pulse, levels=[0.4, 1.0], unit_blocks=512).run()
+    >>> _ = create_study(folder, blocks, pulse, levels=[0.4, 1.0], blocks_per_batch=512).run()
     >>> rocking.Study(folder).results().overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
     product = create_product(blocks, motions, levels, measure, polarity, model, chattering, duration, friction)
-    return open_or_create(folder, product, unit_blocks)
+    return open_or_create(folder, product, blocks_per_batch)
 
 
 def open_or_create(
-    folder: str | Path, product: SimulationProduct, unit_blocks: int | None = None, records: Sequence[str] = ()
+    folder: str | Path, product: SimulationProduct, blocks_per_batch: int | None = None, records: Sequence[str] = ()
 ) -> Study:
     """Create the study of a product, or open it and check its inputs."""
     if not contains_study(folder):
         require_empty(folder)  # before the pilot and the lock file
-        unit = choose_unit_shape(product, unit_blocks)
+        batch_shape = choose_batch_shape(product, blocks_per_batch)
         with lock_folder(folder):
             if not contains_study(folder):  # another process may have created it meanwhile
-                Store.create(folder, product, unit, records)
+                Store.create(folder, product, batch_shape, records)
     study = Study(folder)
     study._store.check_inputs(product)
-    width, count = study._store.grid.unit_shape[3], len(product.bodies)
-    if unit_blocks is not None and min(choose_unit_shape(product, unit_blocks)[3], count) != min(width, count):
-        raise OptionError(f"the study already exists, in units of {width} blocks: omit {{}}", "unit_blocks")
+    width, count = study._store.grid.batch_shape[3], len(product.bodies)
+    if blocks_per_batch is not None and min(choose_batch_shape(product, blocks_per_batch)[3], count) != min(
+        width, count
+    ):
+        raise OptionError(f"the study already exists, in batches of {width} blocks: omit {{}}", "blocks_per_batch")
     return study
 
 
@@ -465,10 +467,10 @@ def _parse_part(part: str) -> tuple[int, int]:
     return int(number), int(count)
 
 
-def _run_units(store: Store, share: Sequence[Key], executor: Any) -> RunReport:
-    """Compute the missing units of a share until SIGTERM."""
+def _run_batches(store: Store, share: Sequence[Key], executor: Any) -> RunReport:
+    """Compute the missing batches of a share until SIGTERM."""
     start, grid, pending = time.monotonic(), store.grid, dict[Future[bytes], Key]()
-    units, simulations, failed = 0, 0, dict[str, str]()
+    batches, simulations, failed = 0, 0, dict[str, str]()
     done = store.find_done()
     missing = [key for key in share if key not in done]
     remaining, total = iter(missing), sum(map(grid.count_simulations, share))
@@ -480,7 +482,7 @@ def _run_units(store: Store, share: Sequence[Key], executor: Any) -> RunReport:
     ):
         try:
             while True:
-                # Each worker has a current unit and a next one.
+                # Each worker has a current batch and a next one.
                 capacity = 0 if stop.is_set() else max(2 * max(1, count()) - len(pending), 0)
                 for key in itertools.islice(remaining, capacity):
                     pending[submit(store.create_input(key))] = key
@@ -495,16 +497,16 @@ def _run_units(store: Store, share: Sequence[Key], executor: Any) -> RunReport:
                     except Exception as error:
                         prefix = "" if isinstance(error, RockingError) else f"{type(error).__name__}: "
                         failed[format_key(key)] = " ".join(f"{prefix}{error}".split()).rstrip(": ")
-                        bar.note(f"{format_count(len(failed), 'unit')} failed")
+                        bar.note(f"{format_count(len(failed), 'batch')} failed")
                         continue
-                    write_atomically(store.unit_path(key), data)
-                    units, simulations = units + 1, simulations + grid.count_simulations(key)
+                    write_atomically(store.batch_path(key), data)
+                    batches, simulations = batches + 1, simulations + grid.count_simulations(key)
                     bar.advance(grid.count_simulations(key))
         finally:
             for future in pending:
                 future.cancel()
-    stopped = stop.is_set() and units + len(failed) < len(missing)
-    return RunReport(units, simulations, time.monotonic() - start, failed, stopped)
+    stopped = stop.is_set() and batches + len(failed) < len(missing)
+    return RunReport(batches, simulations, time.monotonic() - start, failed, stopped)
 
 
 @contextlib.contextmanager
@@ -522,12 +524,12 @@ def _catch_sigterm() -> Iterator[threading.Event]:
 
 
 @contextlib.contextmanager
-def _open_workers(executor: Any) -> Iterator[tuple[Callable[[UnitInput], Future[bytes]], Callable[[], int]]]:
-    """Yield functions that submit a unit and count the workers; errors stop the threads."""
+def _open_workers(executor: Any) -> Iterator[tuple[Callable[[BatchInput], Future[bytes]], Callable[[], int]]]:
+    """Yield functions that submit a batch and count the workers; errors stop the threads."""
     if executor is None:
         cancelled, threads = threading.Event(), ThreadPoolExecutor(choose_thread_count())
         try:
-            yield lambda unit_input: threads.submit(compute_unit, unit_input, cancelled), choose_thread_count
+            yield lambda batch_input: threads.submit(compute_batch, batch_input, cancelled), choose_thread_count
         finally:
             cancelled.set()
             threads.shutdown(cancel_futures=True)
@@ -538,9 +540,9 @@ def _open_workers(executor: Any) -> Iterator[tuple[Callable[[UnitInput], Future[
         message = "{} must be a concurrent.futures.Executor or a client of dask.distributed; got "
         raise OptionError(message + checks.short_repr(executor), "executor", value=executor)
 
-    def submit(unit_input: UnitInput) -> Future[bytes]:
+    def submit(batch_input: BatchInput) -> Future[bytes]:
         try:
-            return pool.submit(compute_unit, unit_input)
+            return pool.submit(compute_batch, batch_input)
         except RuntimeError as error:  # also BrokenExecutor
             raise _create_worker_error(error) from error
 
@@ -558,4 +560,4 @@ def _open_workers(executor: Any) -> Iterator[tuple[Callable[[UnitInput], Future[
 
 
 def _create_worker_error(reason: object) -> StudyError:
-    return StudyError(f"the workers were lost: {reason}; computed units are stored, so run the study again")
+    return StudyError(f"the workers were lost: {reason}; computed batches are stored, so run the study again")

@@ -1,4 +1,4 @@
-"""Units of a study: grid cells, their size, computation and encoding."""
+"""Batches of a study: grid cells, their size, computation and encoding."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ from rocking.simulation.ensemble import VARIABLES, SimulationProduct
 #: All outcomes of a simulation, in the order of the encoding.
 OUTCOMES: Final = tuple(VARIABLES)
 
-#: Unit sizes are multiples of this number of blocks, which the engine integrates together.
+#: Batch sizes are multiples of this number of blocks, which the engine integrates together.
 _GROUP_SIZE: Final = 512
 
-#: Maximum number of simulations in a unit.
+#: Maximum number of simulations in a batch.
 _MAX_SIMULATIONS: Final = 1 << 18
 
 #: Compression saves three quarters of the bytes and costs half a microsecond per simulation.
@@ -40,7 +40,7 @@ _COMPRESSION_LEVEL: Final = 1
 #: Bytes of the hash at the end of a file.
 _HASH_SIZE: Final = hashlib.sha256().digest_size
 
-#: Index of a unit along motions, scales, polarities and blocks.
+#: Index of a batch along motions, scales, polarities and blocks.
 Key = tuple[int, ...]
 
 
@@ -55,46 +55,46 @@ def unseal(data: bytes) -> bytes | None:
 
 
 @dataclass(frozen=True)
-class UnitGrid:
-    """Division of simulations (motions, scales, polarities, blocks) into units."""
+class BatchGrid:
+    """Division of simulations (motions, scales, polarities, blocks) into batches."""
 
     shape: tuple[int, ...]
-    unit_shape: tuple[int, ...]
+    batch_shape: tuple[int, ...]
 
     @functools.cached_property
     def cells(self) -> tuple[int, ...]:
-        """Number of units along each axis."""
-        return tuple(math.ceil(size / part) for size, part in zip(self.shape, self.unit_shape, strict=True))
+        """Number of batches along each axis."""
+        return tuple(math.ceil(size / part) for size, part in zip(self.shape, self.batch_shape, strict=True))
 
     def __len__(self) -> int:
         return math.prod(self.cells)
 
     def __iter__(self) -> Iterator[Key]:
-        """Iterate over the keys of all units, the last axis fastest."""
+        """Iterate over the keys of all batches, the last axis fastest."""
         return itertools.product(*map(range, self.cells))
 
     def ranges(self, key: Key) -> tuple[slice, ...]:
-        """Return the range of a unit along each axis."""
-        axes = zip(key, self.unit_shape, self.shape, strict=True)
+        """Return the range of a batch along each axis."""
+        axes = zip(key, self.batch_shape, self.shape, strict=True)
         return tuple(slice(index * part, min(index * part + part, size)) for index, part, size in axes)
 
     def count_simulations(self, key: Key) -> int:
-        """Count the simulations of a unit."""
+        """Count the simulations of a batch."""
         return math.prod(part.stop - part.start for part in self.ranges(key))
 
 
 def format_key(key: Key) -> str:
-    """Return the file name of a unit."""
-    return "unit." + ".".join(map(str, key))
+    """Return the file name of a batch."""
+    return "batch." + ".".join(map(str, key))
 
 
-def choose_unit_shape(product: SimulationProduct, unit_blocks: int | None) -> tuple[int, ...]:
-    """Choose the size of a unit for a number of blocks, or for about five seconds (pilot run)."""
-    if unit_blocks is not None:
-        width = checks.integer(unit_blocks, "unit_blocks", OptionError, minimum=_GROUP_SIZE)
+def choose_batch_shape(product: SimulationProduct, blocks_per_batch: int | None) -> tuple[int, ...]:
+    """Choose the size of a batch for a number of blocks, or for about five seconds (pilot run)."""
+    if blocks_per_batch is not None:
+        width = checks.integer(blocks_per_batch, "blocks_per_batch", OptionError, minimum=_GROUP_SIZE)
         if width % _GROUP_SIZE:
             message = f"{{}} must be a multiple of {_GROUP_SIZE}, not {width}"
-            raise OptionError(message, "unit_blocks", value=unit_blocks)
+            raise OptionError(message, "blocks_per_batch", value=blocks_per_batch)
         return 1, 1, 1, width
     motions, scales, polarities, count = product.shape
     sample = product.bodies.select(np.linspace(0, count - 1, min(count, _GROUP_SIZE)).astype(np.int64))
@@ -122,34 +122,36 @@ def identify_program() -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class UnitInput:
-    """Complete input of a worker for a unit; factors have the shape (motions, scales, polarities)."""
+class BatchInput:
+    """Complete input of a worker for a batch; factors have the shape (motions, scales, polarities)."""
 
     setup: Setup
     motions: tuple[Motion, ...]
     factors: Floats
-    unit_shape: tuple[int, ...]
+    batch_shape: tuple[int, ...]
     program: str = field(default_factory=identify_program)
 
 
-def compute_unit(unit_input: UnitInput, cancelled: threading.Event | None = None) -> bytes:
-    """Compute the bytes of a unit, unless `cancelled`; raise a StudyError if the program differs."""
-    if unit_input.program != identify_program():
+def compute_batch(batch_input: BatchInput, cancelled: threading.Event | None = None) -> bytes:
+    """Compute the bytes of a batch, unless `cancelled`; raise a StudyError if the program differs."""
+    if batch_input.program != identify_program():
         worker = f"the worker on {socket.gethostname()} has {identify_program()}"
-        raise StudyError(f"{worker}, the study requires {unit_input.program}")
-    # NaN where the unit contains fewer simulations than a full one
-    values = np.full((len(OUTCOMES), *unit_input.unit_shape), np.nan)
-    shape = (*unit_input.factors.shape, len(unit_input.setup.bodies))
-    for part in split_simulations(unit_input.motions, np.full(shape[0], math.prod(shape[1:]))):
+        raise StudyError(f"{worker}, the study requires {batch_input.program}")
+    # NaN where the batch contains fewer simulations than a full one
+    values = np.full((len(OUTCOMES), *batch_input.batch_shape), np.nan)
+    shape = (*batch_input.factors.shape, len(batch_input.setup.bodies))
+    for part in split_simulations(batch_input.motions, np.full(shape[0], math.prod(shape[1:]))):
         m, s, k, block = key = np.unravel_index(np.arange(part.start, part.stop), shape)
-        task = create_task(block, unit_input.motions, m, unit_input.factors[m, s, k])
-        outcomes = simulate_task(unit_input.setup, task, cancelled)
+        task = create_task(block, batch_input.motions, m, batch_input.factors[m, s, k])
+        outcomes = simulate_task(batch_input.setup, task, cancelled)
         for cells, name in zip(values, OUTCOMES, strict=True):
             cells[key] = outcomes[name]
     return seal(zlib.compress(np.ascontiguousarray(values, "<f8").data, _COMPRESSION_LEVEL))
 
 
-def decode(data: bytes, unit_shape: tuple[int, ...]) -> Floats | None:
-    """Decode the outcomes of a full unit, shape (outcomes, *unit_shape); return None if any bit has changed."""
+def decode(data: bytes, batch_shape: tuple[int, ...]) -> Floats | None:
+    """Decode the outcomes of a full batch, shape (outcomes, *batch_shape); return None if any bit has changed."""
     packed = unseal(data)
-    return None if packed is None else np.frombuffer(zlib.decompress(packed), "<f8").reshape(len(OUTCOMES), *unit_shape)
+    return (
+        None if packed is None else np.frombuffer(zlib.decompress(packed), "<f8").reshape(len(OUTCOMES), *batch_shape)
+    )
