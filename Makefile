@@ -11,6 +11,8 @@ PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --be
 FAST := "not thorough and not slow and not browser"
 # The longest that a test which is not slow may take, s: generous, since machines may be slow, too, and compile first.
 LIMITED := -o faulthandler_timeout=400
+# A browser may cease to answer, once in some hundred starts: its test ends sooner, and failed tests run once more.
+BROWSER_LIMITED := -o faulthandler_timeout=200
 QUICKLY := -m $(FAST) --hypothesis-profile=few $(LIMITED)
 # Something of every library that the package needs, for other versions than those that are pinned; `make lowest EVERY_PART=tests` runs all.
 EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py response.py chattering_maps.py processing.py explorer_server.py first_response.py)
@@ -47,7 +49,8 @@ test-all: .venv/.all ## run them with more cases each, and longer ones (twice as
 	$(PYTEST) -m "not slow and not browser" $(LIMITED)
 
 browser: .venv/.all .page-tools/.installed ## drive the explorer's page in Chromium, which must be installed
-	ROCKING_BROWSER_REQUIRED=1 $(PYTEST) -m "browser and not thorough" $(LIMITED)
+	ROCKING_BROWSER_REQUIRED=1 $(PYTEST) -m "browser and not thorough" $(BROWSER_LIMITED) || \
+	ROCKING_BROWSER_REQUIRED=1 $(PYTEST) -m "browser and not thorough" $(BROWSER_LIMITED) --last-failed
 
 browser-all: .venv/.all .page-tools/.installed ## drive it through more cases each
 	ROCKING_BROWSER_REQUIRED=1 $(PYTEST) -m browser $(LIMITED)

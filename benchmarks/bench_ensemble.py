@@ -95,7 +95,7 @@ def vertical_times(model: Model, motion: rocking.Motion, blocks: rocking.Blocks)
 def one_by_one(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> None:
     """March every block to its end, as bodies that lanes do not support."""
     scheme, (group,) = Certified(), prepare_grounds((motion,), blocks.gravity)
-    records = blocks.create_kernel_records(model, scheme.thresholds(blocks, motion, model))
+    records = blocks.create_kernel_structs(model, scheme.thresholds(blocks, motion, model))
     states = state.create_states(len(blocks), state.NO_STOP_PIECE)
     index, factors = np.zeros(len(blocks), dtype=np.int64), np.ones(len(blocks))
     pool = lanes.build_pool(group.grounds, index, factors, records, states, math.inf, 0)

@@ -38,7 +38,7 @@ print(f"the period doubles at {doubling:.9f}; in closed form at {closed_form:.9f
 # A livelier ball never settles: two neighbouring states part exponentially.
 
 lively = dynamics.BouncingBall(0.9, gravity=g)
-exponents = dynamics.lyapunov_exponents(lively, shaken(5.0)[1], [0.1, 0.5], n_periods=3000)
+exponents = dynamics.lyapunov_exponents(lively, shaken(5.0)[1], [0.1, 0.5], period_count=3000)
 largest, error = exponents.largest, exponents.standard_error
 print(f"largest Lyapunov exponent {largest:.2f} a period, standard error {error:.2f}")
 

@@ -746,7 +746,7 @@ def periodic_orbits() -> Iterator[Item]:
     for kind, (body, motion, _) in PERIODIC.items():
         for orbit in dynamics.periodic_orbits(body, motion, starts=24)[:4]:
             multipliers = np.sort(np.abs(orbit.multipliers))
-            yield kind, [orbit.state, multipliers, orbit.impacts, orbit.is_symmetric, orbit.rests]
+            yield kind, [orbit.state, multipliers, orbit.impact_count, orbit.is_symmetric, orbit.has_rest]
             yield "summary", orbit.summary()
 
 
@@ -758,7 +758,7 @@ def continuations() -> Iterator[Item]:
         return ball, one.scaled(level)
 
     found = dynamics.periodic_orbits(*family(1.2), starts=40)
-    start = next(each for each in found if each.is_stable and not each.rests and each.impacts)
+    start = next(each for each in found if each.is_stable and not each.has_rest and each.impacts)
     branch = dynamics.continue_orbit(start, family, 1.2, (1.0, 1.7), step=0.2)
     yield "ends", branch.ends
     yield "bifurcations", [[each.kind, each.value] for each in branch.bifurcations]
@@ -788,7 +788,10 @@ def basins() -> Iterator[Item]:
 def exponents() -> Iterator[Item]:
     for body, motion, (positions, velocities) in PERIODIC.values():
         found = dynamics.lyapunov_exponents(body, motion, (positions[1], velocities[2]), 40, transient_periods=5)
-        yield "exponents", [found.largest, found.smallest, found.impacts, found.share_at_rest, int(found.outcome)]
+        yield (
+            "exponents",
+            [found.largest, found.smallest, found.impacts_per_period, found.share_at_rest, int(found.outcome)],
+        )
         yield "summary", found.summary()
 
 

@@ -18,6 +18,9 @@ _PROGRAMS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-
 #: How many times slower than it is the processor of a page shall be.
 SLOWDOWN = float(os.environ.get("ROCKING_BROWSER_SLOWDOWN", "1"))
 
+#: Longest wait, s: shorter than the time after which a test is ended, so that its failure names what was waited for.
+_MAX_WAIT = 150.0
+
 _FLAGS = (
     "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync",
@@ -113,7 +116,7 @@ class Watched:
         """
         from playwright.sync_api import Error
 
-        deadline, pause = time.monotonic() + timeout * _busy(), 0.02
+        deadline, pause = time.monotonic() + min(timeout * _busy(), _MAX_WAIT), 0.02
         while time.monotonic() < deadline:
             try:
                 found = self.page.evaluate(expression)
@@ -125,7 +128,8 @@ class Watched:
                 return found
             time.sleep(pause)
             pause = min(1.2 * pause, 0.2)  # each question takes time from what is waited for
-        raise AssertionError(f"not within {timeout:g} s: {what or expression}; {self.text('#problem')}")
+        state = self.js("JSON.stringify(document.body.dataset)")
+        raise AssertionError(f"not within {timeout:g} s: {what or expression}; {state}; {self.text('#problem')}")
 
     def text(self, selector):
         """Text of an element; where a number and its unit are kept on one line, there is a space between them."""

@@ -107,7 +107,7 @@ def test_labels_of_clusters_are_those_of_the_motions_that_are_used():
     plain = assess(VASE, MOTIONS, levels=8, clusters=labels)
     more = assess(VASE, {"silence": nothing} | MOTIONS, levels=8, clusters=["none", *labels])
     assert more.objects[0].curve.median_interval == plain.objects[0].curve.median_interval
-    assert more.objects[0].curve.clusters == 4
+    assert more.objects[0].curve.cluster_count == 4
 
 
 def test_ranks_are_those_of_the_same_resampled_motions():

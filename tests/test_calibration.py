@@ -108,7 +108,7 @@ def test_the_hidden_block_lies_within_the_estimates(found):
 def test_the_ensemble_predicts_what_its_blocks_do(found, unseen):
     motions = unseen[0][:6]
     fallen = np.array([outcomes(motions, block) for block in found.blocks])
-    count = found.diagnostics.effective
+    count = found.diagnostics.effective_count
     share = (count * found.weights @ fallen + 0.5) / (count + 1.0)
     expected = found.outlier_probability + (1.0 - 2.0 * found.outlier_probability) * share
     np.testing.assert_allclose(found.predict(motions), expected, rtol=1e-12)
@@ -328,10 +328,10 @@ def test_a_search_goes_on_while_few_candidates_speak_for_what_it_found(
         return (points[:, 1:2] < thresholds).astype(np.float32)
 
     found = search(Problem(space, evidence.observed, 0.01, tried), candidates, np.random.default_rng(5))
-    assert max(found.agreement.values()) < MAX_R_HAT
+    assert max(found.r_hat.values()) < MAX_R_HAT
     drawn = found.evidence.candidates.filling_count + sum(count for count, _ in found.evidence.candidates.proposals)
     assert drawn == pytest.approx((13.0 / 7.0 if goes_on else 1.0) * candidates, rel=0.05)
-    assert (found.effective_candidates < 100.0) == goes_on
+    assert (found.effective_count < 100.0) == goes_on
 
 
 def test_shares_are_sums_over_weighted_candidates(threshold_evidence):

@@ -223,7 +223,7 @@ def test_calibrate_json_is_the_calibration(run, outcomes_table):
     found = rocking.calibrate(motions, overturned, p=3.0, restitution="housner", two_sided=False, candidates=128)
     assert list(result["estimates"]) == ["alpha"]
     assert result["estimates"]["alpha"]["median"] == pytest.approx(found.estimates["alpha"].median, rel=1e-12)
-    assert result["diagnostics"]["candidates"] == found.diagnostics.candidates
+    assert result["diagnostics"]["candidate_count"] == found.diagnostics.candidate_count
     assert set(result["cross_validated"]) == {"accuracy", "log_loss", "brier"}
     predicted = found.predict([rocking.records.load(name) for name in (RECORD, OTHER)])
     assert list(result["predicted"].values()) == pytest.approx(predicted.tolist(), rel=1e-12)
@@ -302,7 +302,7 @@ def test_records_of_a_fragility_belong_together_by_station_or_by_labels(run):
     code, alone, err = run(*stripes)
     assert code == 0 and "--clusters may be station, which joins them" in err and "6 motions, 9 stripes" in alone
     fitted = fragility(rocking.Block(width=0.24, height=1.1), motions, clusters=stations, **options)
-    assert fitted.curves[0].clusters == 3
+    assert fitted.curves[0].cluster_count == 3
     for given in ("station", ", ".join(stations)):
         code, out, err = run(*stripes, "--clusters", given, "--json")
         assert (code, err) == (0, "")

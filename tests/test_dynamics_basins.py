@@ -115,7 +115,7 @@ def test_a_state_at_any_point_of_a_long_orbit_has_settled_on_it():
     assert [each.period for each in known.attractors] in ([4, 23], [23, 4])
     assert [known.attractors[owner].period for owner in owners] == periods
     on = kept[periods.index(23)][:23]
-    assert np.count_nonzero(known.classify(strobe._to_records(on)[1]) == -1) > KnownAttractors.MAX_TRIES
+    assert np.count_nonzero(known.classify(strobe._to_structs(on)[1]) == -1) > KnownAttractors.MAX_TRIES
     assert set(known.classify_or_search(on).tolist()) == {owners[periods.index(23)]} and len(known.attractors) == 2
 
 
@@ -129,7 +129,7 @@ def test_a_small_part_of_a_grid_has_the_same_attractor(width):
 def test_what_rests_is_an_attractor_and_a_chaotic_state_has_not_settled():
     still = dynamics.basins(BLOCK, pulses.sine(1.0, 1.0, cycles=1), np.linspace(-1e-3, 1e-3, 9), [0.0])
     assert still.data.attractor.values.tolist() == ["rest"] and still.data.share.values == [1.0]
-    assert still.data.rests.values.tolist() == [True] and still.data.multiplier.values == [0.0]
+    assert still.data.has_rest.values.tolist() == [True] and still.data.multiplier.values == [0.0]
     ball = dynamics.BouncingBall(0.8, gravity=10.0)
     chaos = dynamics.basins(ball, pulses.sine(30.0, 5.0, cycles=1), np.linspace(0.0, 0.5, 9), [0.0, 0.5])
     assert chaos.data.attractor.values.tolist() == ["not settled"]
@@ -164,14 +164,14 @@ def test_a_neighbourhood_holds_what_enters_it():
             attractor = known.attractors[owner]
             for _ in range(3):
                 states = strobe(states, attractor.period)
-                assert np.all(known.classify(strobe._to_records(states)[1]) == owner)
+                assert np.all(known.classify(strobe._to_structs(states)[1]) == owner)
             judged += len(states)
     assert judged > 500
 
 
 def test_an_attractor_that_rests_at_the_start_of_a_period_is_known_after_one():
     ball, table = dynamics.BouncingBall(0.3, gravity=10.0), pulses.sine(11.0, 2.0, cycles=1)
-    found = dynamics.basins(ball, table, np.linspace(0.0, 0.1, 41), np.linspace(0.01, 0.5, 41), n_periods=5)
+    found = dynamics.basins(ball, table, np.linspace(0.0, 0.1, 41), np.linspace(0.01, 0.5, 41), period_count=5)
     assert not dynamics.stroboscopic_map(ball, table)([0.05, 0.0]).any()
     taken, counts = np.unique(found.data.periods.values, return_counts=True)
     # The first cells come before the attractor is known, and all others after it.

@@ -29,7 +29,7 @@ def test_the_period_of_a_ball_doubles_where_its_closed_form_says(e, about):
         ball_case(e), values, start_of_one_bounce(e, values[0])[0], transient_periods=6000, recorded_periods=16
     )
     assert found.data.period.values[0, :, 0].tolist() == [1, 1, 2, 2]
-    assert found.data.impacts.values[0, :, 0].tolist() == [1, 1, 2, 2]
+    assert found.data.impact_count.values[0, :, 0].tolist() == [1, 1, 2, 2]
     assert found.changes() == [(values[1], values[2], 1, 2)]
     # The two states part as the square root of the distance from the bifurcation.
     parted = np.ptp(found.data.velocity.values[0, :, 0], axis=-1)
@@ -53,8 +53,10 @@ def test_going_up_and_down_keep_what_they_are_on():
     for direction, first in (("up", values[0]), ("down", values[-1])):
         starts = [[0.0, 0.0], start_of_one_bounce(0.8, first)[0]]
         found = dynamics.bifurcation_diagram(ball_case(0.8), values, starts, direction=direction)
-        assert np.all(found.data.coordinate.values[0, :, 0] == 0.0) and np.all(found.data.impacts.values[0, :, 0] == 0)
-        assert np.all(found.data.impacts.values[0, :, 1] == 1)
+        assert np.all(found.data.coordinate.values[0, :, 0] == 0.0) and np.all(
+            found.data.impact_count.values[0, :, 0] == 0
+        )
+        assert np.all(found.data.impact_count.values[0, :, 1] == 1)
         expected = np.array([start_of_one_bounce(0.8, value)[0] for value in values])
         assert found.data.coordinate.values[0, :, 1, -1] == pytest.approx(expected[:, 0], abs=1e-9)
         assert found.data.velocity.values[0, :, 1, -1] == pytest.approx(expected[:, 1], abs=1e-8)
@@ -112,7 +114,7 @@ def test_impacts_are_those_of_the_orbit_infinite_where_chattering_is_complete(re
 
     found = dynamics.bifurcation_diagram(case, levels, [0.0, 0.0], chattering=chattering)
     orbits = [dynamics.periodic_orbits(*case(level), starts=[[0.0, 0.0]], chattering=chattering)[0] for level in levels]
-    impacts = found.data.impacts.values[0, :, 0].tolist()
+    impacts = found.data.impact_count.values[0, :, 0].tolist()
     assert impacts == [each.impacts for each in orbits] and impacts[0] == 0.0 < impacts[1]
     assert math.isinf(impacts[1]) == (restitution > 0.0 and chattering == "certified")
 

@@ -22,7 +22,7 @@ def table(level, cycles=1):
 def branch_of(family, value, limits, *, starts=64, **options):
     """Branch of the stable orbit with impacts that is found first."""
     found = dynamics.periodic_orbits(*family(value), starts=starts, **options)
-    start = next(each for each in found if each.is_stable and not each.rests and each.impacts)
+    start = next(each for each in found if each.is_stable and not each.has_rest and each.impacts)
     return dynamics.continue_orbit(start, family, value, limits, step=0.2)
 
 
@@ -167,7 +167,7 @@ def test_a_ball_that_keeps_no_speed_rests_up_to_a_level_in_closed_form():
     assert branch.bifurcations[-1].value == pytest.approx(math.hypot(1.0, math.pi), abs=1e-9)
     # Beyond, it leaves at once, and a multiplier is not zero: that of any restitution, with none.
     (leaves,) = dynamics.periodic_orbits(*family(3.5), starts=16)
-    assert not leaves.rests and leaves.impacts == 1.0
+    assert not leaves.has_rest and leaves.impact_count == 1.0
     trace = closed_orbits.Ball(0.0, 1).trace(3.5, stable=True)
     assert leaves.multipliers.tolist() == pytest.approx([trace, 0.0], abs=1e-9)
 

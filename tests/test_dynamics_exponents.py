@@ -39,7 +39,7 @@ def test_of_a_bouncing_ball_they_are_the_logarithms_of_its_multipliers(e, gamma)
     state, total = start_of_one_bounce(e, gamma)
     found = dynamics.lyapunov_exponents(ball, table, state, 4000)
     expected = np.sort(np.log(np.abs(np.roots([1.0, -total, e * e]))))[::-1]
-    assert found.impacts == 1.0
+    assert found.impacts_per_period == 1.0
     assert (found.largest, found.smallest) == pytest.approx(tuple(expected), abs=1e-6)
 
 
@@ -56,7 +56,7 @@ def test_of_a_block_they_are_those_of_differences_of_its_map(amplitude, model):
     expected = np.sort(np.log(np.abs(np.linalg.eigvals(change))))[::-1]
     found = dynamics.lyapunov_exponents(block, motion, on, 2000, model=model)
     assert (found.largest, found.smallest) == pytest.approx(tuple(expected), abs=1e-6)
-    assert found.largest + found.smallest == pytest.approx(2.0 * found.impacts * math.log(0.9), abs=1e-6)
+    assert found.largest + found.smallest == pytest.approx(2.0 * found.impacts_per_period * math.log(0.9), abs=1e-6)
 
 
 def test_where_every_period_holds_a_rest_they_are_minus_infinity():
@@ -90,7 +90,7 @@ def test_in_chaos_one_is_positive_and_their_sum_is_the_contraction_of_areas(name
     body, motion, state, drag = chaotic_cases()[name]
     found = dynamics.lyapunov_exponents(body, motion, state, 4000)
     assert found.largest > 10.0 * found.standard_error > 0.0
-    contraction = 2.0 * math.log(body.restitution) * found.impacts - drag
+    contraction = 2.0 * math.log(body.restitution) * found.impacts_per_period - drag
     assert found.stretches.mean(axis=0).sum() == pytest.approx(contraction, abs=1e-9)
     # Two orbits that start 1e-9 apart, brought together again after every period, at 40 places of one orbit; in the
     # first periods they turn into the direction in which they part.
@@ -111,7 +111,10 @@ def test_at_a_rest_where_impacts_lose_nothing_they_are_zero_as_the_multipliers_a
     block, motion = Block.from_parameters(p=2.0, alpha=0.2, restitution=1.0), pulses.sine(1.0, 1.0, cycles=1)
     (orbit,) = dynamics.periodic_orbits(block, motion, starts=[[0.0, 0.0]])
     found = dynamics.lyapunov_exponents(block, motion, [0.0, 0.0], 100)
-    assert orbit.rests and np.log(np.abs(orbit.multipliers)).tolist() == [found.largest, found.smallest] == [0.0, 0.0]
+    assert orbit.has_rest and np.log(np.abs(orbit.multipliers)).tolist() == [found.largest, found.smallest] == [
+        0.0,
+        0.0,
+    ]
     assert found.share_at_rest == 1.0 and "rest" not in found.summary()
 
 

@@ -263,4 +263,4 @@ def test_a_spring_that_presses_against_one_of_two_stops_brings_the_body_to_rest_
 
 def test_a_body_under_a_motion_without_acceleration_rests():
     (orbit,) = dynamics.periodic_orbits(dynamics.BouncingBall(0.5), pulses.sine(0.0, 5.0, cycles=1), starts=64)
-    assert orbit.rests and orbit.impacts == 0.0
+    assert orbit.has_rest and orbit.impact_count == 0.0

@@ -63,8 +63,8 @@ def test_areas_shrink_by_restitution_and_damping_alone(found):
         damping = body.equation.damping if not isinstance(body, Block) else 0.0
         e = body.restitution
         for orbit in orbits:
-            if not orbit.rests and abs(orbit.multipliers[0]) < 1e3:
-                expected = e ** (2.0 * orbit.impacts) * math.exp(-damping * orbit.duration)
+            if not orbit.has_rest and abs(orbit.multipliers[0]) < 1e3:
+                expected = e ** (2.0 * orbit.impact_count) * math.exp(-damping * orbit.duration)
                 assert complex(orbit.multipliers.prod()) == pytest.approx(expected, rel=1e-8)
                 judged += 1
     assert judged >= 20
@@ -90,7 +90,7 @@ def test_a_stable_orbit_attracts_and_an_unstable_one_repels(found):
     for orbits in found.values():
         for orbit in orbits:
             largest = abs(orbit.multipliers[0])
-            if 0.9 < largest < 1.1 or orbit.rests or not 0 < orbit.impacts < 5 or largest > 50.0:
+            if 0.9 < largest < 1.1 or orbit.has_rest or not 0 < orbit.impact_count < 5 or largest > 50.0:
                 continue
             strobe = dynamics.stroboscopic_map(orbit.body, orbit.motion, model=orbit.model)
             near = orbit.state * (1.0 + 1e-7)
@@ -106,17 +106,17 @@ def test_a_stable_orbit_attracts_and_an_unstable_one_repels(found):
 
 def test_an_orbit_with_a_rest_has_multipliers_zero():
     ball, table = dynamics.BouncingBall(0.5, gravity=G), pulses.sine(12.0, TABLE, cycles=1)
-    (rest,) = [each for each in dynamics.periodic_orbits(ball, table, starts=32) if each.rests]
+    (rest,) = [each for each in dynamics.periodic_orbits(ball, table, starts=32) if each.has_rest]
     assert rest.impacts == math.inf and rest.is_stable
     assert rest.multipliers.tolist() == [0.0, 0.0]
     assert rest.response.events["kind"].tolist() == ["rest", "uplift"]
-    (still,) = [each for each in dynamics.periodic_orbits(ball, 0.5 * table, starts=32) if each.rests]
+    (still,) = [each for each in dynamics.periodic_orbits(ball, 0.5 * table, starts=32) if each.has_rest]
     assert still.state.tolist() == [0.0, 0.0] and still.impacts == 0.0
     assert "always at rest" in still.summary()
     # A wall on either side holds the pendulum.
     pendulum, motion = dynamics.InvertedPendulum(3.0, 0.1, 0.5), pulses.sine(0.3, 0.8, cycles=1)
     walls = dynamics.periodic_orbits(pendulum, motion, starts=32)
-    assert sorted(each.state[0] for each in walls if each.rests) == [-0.1, 0.1]
+    assert sorted(each.state[0] for each in walls if each.has_rest) == [-0.1, 0.1]
 
 
 def test_the_linear_response_of_an_oscillator_that_misses_its_stop_is_an_orbit():
@@ -232,10 +232,10 @@ def test_grazing_is_found_from_both_sides():
     start = 0.9 * exact
     judged = 0
     for orbit in dynamics.periodic_orbits(*family(start), starts=128):
-        if orbit.impacts == 0.0 or not orbit.is_stable:
+        if orbit.impact_count == 0.0 or not orbit.is_stable:
             branch = dynamics.continue_orbit(orbit, family, start, (start, 1.2 * exact))
             (grazing,) = [each for each in branch.bifurcations if each.kind == "grazing"]
-            assert grazing.value == pytest.approx(exact, abs=1e-10 if orbit.impacts else 1e-11)
+            assert grazing.value == pytest.approx(exact, abs=1e-10 if orbit.impact_count else 1e-11)
             assert "grazing" in branch.ends
             judged += 1
     assert judged == 2
@@ -252,7 +252,7 @@ def test_chattering_ceases_to_be_complete_at_the_critical_amplitude_and_rest_end
 
     found = {}
     for level in (0.95, 1.01):
-        (rest,) = [each for each in dynamics.periodic_orbits(*family(level * lifts), model="linear") if each.rests]
+        (rest,) = [each for each in dynamics.periodic_orbits(*family(level * lifts), model="linear") if each.has_rest]
         branch = dynamics.continue_orbit(rest, family, level * lifts, (0.9 * lifts, 1.5 * lifts))
         found[level] = {each.kind: each.value for each in branch.bifurcations}
         assert np.all(branch.is_stable)
@@ -329,7 +329,7 @@ def test_a_rest_that_attracts_nothing_is_neutral():
     for restitution, word in ((1.0, "neutral"), (0.9, "stable")):
         ball = dynamics.BouncingBall(restitution)
         (orbit,) = dynamics.periodic_orbits(ball, motion, starts=[[0.0, 0.0]])
-        assert orbit.rests and orbit.is_stable == (word == "stable")
+        assert orbit.has_rest and orbit.is_stable == (word == "stable")
         assert f"{word} orbit of 1 period always at rest" in orbit.summary()
         branch = dynamics.continue_orbit(orbit, lambda level, ball=ball: (ball, motion.scaled(level)), 1.0, (0.9, 1.1))
         assert np.all(branch.is_stable == (word == "stable"))

@@ -100,7 +100,7 @@ def test_a_branch_of_orbits_that_stick_ends_at_that_boundary(restitution, sigma,
 
     known = boundary(restitution, sigma, about)
     start = 0.9 * known
-    (orbit,) = (each for each in dynamics.periodic_orbits(*family(start), starts=[[-sigma, 0.0]]) if each.rests)
+    (orbit,) = (each for each in dynamics.periodic_orbits(*family(start), starts=[[-sigma, 0.0]]) if each.has_rest)
     branch = dynamics.continue_orbit(orbit, family, start, (0.85 * known, 1.1 * known))
     (lost,) = branch.bifurcations
     assert branch.ends[1] == lost.kind == "loss of complete chattering"
@@ -113,8 +113,8 @@ def test_an_orbit_that_sticks_forgets_everything():
     judged = 0
     for restitution, sigma, frequency in ((0.8, 0.0, 0.3), (0.5, -0.3, 0.6)):
         body, motion = oscillator(restitution, sigma), forcing(frequency)
-        (orbit,) = (each for each in dynamics.periodic_orbits(body, motion, starts=[[-sigma, 0.0]]) if each.rests)
-        assert orbit.impacts == math.inf and orbit.multipliers.tolist() == [0.0, 0.0]
+        (orbit,) = (each for each in dynamics.periodic_orbits(body, motion, starts=[[-sigma, 0.0]]) if each.has_rest)
+        assert orbit.impact_count == math.inf and orbit.multipliers.tolist() == [0.0, 0.0]
         strobe = dynamics.stroboscopic_map(body, motion)
         near = orbit.state + np.array([[0.0, 0.0], [1e-3, 0.0], [0.0, -1e-3], [-1e-3, 1e-3], [1e-8, 1e-8]])
         after, change = strobe.derivative(near, 2)

@@ -85,7 +85,7 @@ rock = dynamics.stroboscopic_map(ball, table)
 rock([0.1, 0.5])
 rock.derivative([0.1, 0.5])
 dynamics.lyapunov_exponents(ball, table, [0.1, 0.5], 20, transient_periods=5)
-dynamics.basins(ball, table, [0.01, 0.05], [0.0, 0.1], n_periods=10)
+dynamics.basins(ball, table, [0.01, 0.05], [0.0, 0.1], period_count=10)
 mirrored = rocking.Block.from_parameters(p=2.0, alpha=0.6, restitution=0.55)
 def swing(amplitude):
     return mirrored, rocking.pulses.sine(amplitude, 0.8, cycles=1)

@@ -532,13 +532,13 @@ def test_multiples_of_a_motion_are_one_cluster_however_they_are_given():
     scaled = [pulse.scaled_to(level) for pulse in PULSES for level in levels]
     cloud = fragility(BLOCK, [-motion if k % 2 else motion for k, motion in enumerate(scaled)])
     curve = cloud.curves[0]
-    assert curve.clusters == stripes.clusters == len(PULSES)
+    assert curve.cluster_count == stripes.cluster_count == len(PULSES)
     assert not curve.is_independent
     assert curve.median_interval == pytest.approx(stripes.median_interval, rel=1e-6)
     assert any("belong together" in note for note in cloud.notes)
     # Twice the same data say no more: only the count of trials differs.
     twice = fragility(BLOCK, [*PULSES, *PULSES], levels=levels).curves[0]
-    assert twice.clusters == len(PULSES)
+    assert twice.cluster_count == len(PULSES)
     assert twice.median == pytest.approx(curve.median, rel=1e-6)
 
 
@@ -549,7 +549,7 @@ def test_motions_of_one_label_count_together_as_their_outcomes_do():
     of_name = dict(zip(each.motion.unique(), labels, strict=True))
     given = fit_fragility(each.pga_m_s2, each.overturned, clusters=each.motion.map(of_name)).curves[0]
     curve, alone = found.curves[0], fragility(BLOCK, PULSES, levels=levels).curves[0]
-    assert (curve.clusters, alone.clusters) == (5, len(PULSES))
+    assert (curve.cluster_count, alone.cluster_count) == (5, len(PULSES))
     assert "13 motions in 5 clusters, 4 stripes" in found.description
     assert curve.median == alone.median
     assert curve.median_interval == pytest.approx(given.median_interval, rel=1e-9)
@@ -587,9 +587,9 @@ def test_motions_of_one_shape_and_another_length_or_vertical_component_are_not_o
 def test_outcomes_without_a_label_are_on_their_own(missing):
     x, y = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [0, 1, 0, 1, 0, 1]
     own = fit_fragility(x, y, clusters=[missing] * 6).curves[0]
-    assert own.clusters == 6
+    assert own.cluster_count == 6
     assert own.is_independent
-    assert fit_fragility(x, y, clusters=["a", missing, "a", missing, 3, 3.0]).curves[0].clusters == 4
+    assert fit_fragility(x, y, clusters=["a", missing, "a", missing, 3, 3.0]).curves[0].cluster_count == 4
 
 
 @pytest.mark.parametrize("level", [4.0, 5.0, 6.0])
@@ -610,7 +610,7 @@ def test_labels_of_pandas_that_are_missing_are_on_their_own_and_masked_outcomes_
         pandas.Series([1, 2, None, 3, 1, None], dtype="Int64"),
         [1, 2, None, 3, 1, float("nan")],
     ):
-        assert fit_fragility(levels, fell, clusters=labels).curves[0].clusters == 5
+        assert fit_fragility(levels, fell, clusters=labels).curves[0].cluster_count == 5
     masked = np.ma.masked_array(fell, mask=[0, 0, 0, 0, 0, 1])
     with pytest.raises(OptionError, match="must not contain masked values"):
         fit_fragility(levels, masked)

@@ -67,7 +67,7 @@ def test_standard_errors_allow_for_tests_that_belong_together():
     for name in ("value", "error", "skill", "skill_error"):
         assert getattr(together.brier, name) == pytest.approx(getattr(apart.brier, name))
         assert getattr(together.log_loss, name) == pytest.approx(getattr(apart.log_loss, name))
-    assert (together.brier.tests, together.brier.clusters) == (8, 4)
+    assert (together.brier.test_count, together.brier.cluster_count) == (8, 4)
 
 
 # Chances and bands
@@ -168,7 +168,7 @@ def test_vertical_motion_and_weights_and_the_model_count():
     shares = np.array([0.25, 0.75]) @ simulated.overturned.transpose("block", "motion").values
     effective = 1.0 / (0.25**2 + 0.75**2)
     assert [test.probability for test in found.tests] == pytest.approx((effective * shares + 0.5) / (effective + 1.0))
-    assert found.brier.clusters == 2  # motions that differ in the vertical component alone are two
+    assert found.brier.cluster_count == 2  # motions that differ in the vertical component alone are two
 
 
 def test_a_simulation_that_was_given_up_counts_as_half_overturned(small_budget):

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_records import in_units_of_g, numbers, one_sided, rocking_block, rules_for, state_of
+from kernel_structs import in_units_of_g, numbers, one_sided, rocking_block, rules_for, state_of
 from oracles.taylor import System, after, coefficients, mp
 
 from rocking.kernels import arc
 from rocking.kernels.arc import evaluate_series, expand_arc, find_converged_order, find_linear_order, find_step_length
 from rocking.kernels.series import write_linear_coefficients
-from rocking.kernels.state import ORDER, Record, create_scratch
+from rocking.kernels.state import ORDER, Struct, create_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -79,7 +79,7 @@ def linear_series(
 
 def nonlinear_series(
     u: float, v: float, lam: float, alpha: float, A: np.ndarray, h: float
-) -> tuple[Record, int, float]:
+) -> tuple[Struct, int, float]:
     scratch, p = create_scratch(), lam**0.5
     scratch["ground"][: len(A)] = A
     scratch["weight"][0] = 1.0

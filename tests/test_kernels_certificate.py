@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from kernel_records import (
+from kernel_structs import (
     GRAVITY,
     block_of,
     ground_of,

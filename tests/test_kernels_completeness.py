@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from kernel_records import long_uncompiled, rocking_block, state_of
+from kernel_structs import long_uncompiled, rocking_block, state_of
 
 import rocking
 from rocking.engine.problem import prepare_ground
 from rocking.kernels.ground import join_grounds
-from rocking.kernels.state import AT_REST, create_records, create_scratch
+from rocking.kernels.state import AT_REST, create_scratch, create_structs
 from rocking.kernels.uplift import write_completeness
 from rocking.motion.motion import find_exceedances
 
@@ -20,7 +20,7 @@ def is_complete(motion: rocking.Motion, thresholds: Pair, rest: float, *, uplift
     block = rocking_block()
     block["threshold"] = thresholds
     state = state_of(AT_REST, 0.0, 0.0, rests=rests, first_uplift=uplift, first_rest=rest)
-    blocks, states = create_records(1, block.dtype), create_records(1, state.dtype)
+    blocks, states = create_structs(1, block.dtype), create_structs(1, state.dtype)
     blocks[0], states[0] = block, state
     complete = np.zeros(1, dtype=bool)
     grounds, first = join_grounds([prepare_ground(motion, 1.0)]), np.zeros(1, dtype=np.int64)

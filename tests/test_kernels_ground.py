@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_records import ULP, in_units_of_g, long_uncompiled, numbers
+from kernel_structs import ULP, in_units_of_g, long_uncompiled, numbers
 from oracles.exact import exact, polynomial
 
 from rocking.kernels.adjoint import add_moments

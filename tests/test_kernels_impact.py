@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from kernel_records import MINUS, PLUS, ULP, in_units_of_g, numbers, rocking_block, rules_for, state_of
+from kernel_structs import MINUS, PLUS, ULP, in_units_of_g, numbers, rocking_block, rules_for, state_of
 from oracles.exact import exact, first_above, polynomial, turning_points
 
 from rocking.kernels.arc import expand_arc

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_records import ULP, in_units_of_g, long_uncompiled, one_sided, rocking_block, rules_for, state_of
+from kernel_structs import ULP, in_units_of_g, long_uncompiled, one_sided, rocking_block, rules_for, state_of
 from oracles.taylor import System, after
 
 from rocking.kernels import state
@@ -27,7 +27,7 @@ from rocking.kernels.lanes import (
     save_lane,
 )
 from rocking.kernels.series import ValueAndSlope
-from rocking.kernels.state import Record, Records, create_scratch
+from rocking.kernels.state import Struct, Structs, create_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -74,15 +74,15 @@ def ground_under(way: Way, row: ValueAndSlope, *corners: float) -> Ground:
 class Step(NamedTuple):
     """What one lane's step started from and how it ended."""
 
-    block: Record
-    start: Record
-    end: Record
+    block: Struct
+    start: Struct
+    end: Struct
     quiet: bool
 
 
 def stepped(
-    blocks: Records,
-    states: Records,
+    blocks: Structs,
+    states: Structs,
     row: ValueAndSlope,
     h: float,
     way: Way = Way(),  # noqa: B008
@@ -122,9 +122,9 @@ def stepped(
     return [Step(blocks[k], before[k], states[k], not events[k]) for k in range(len(blocks))]
 
 
-def drawn(random: np.random.Generator, nonlinear: bool, h: float, stiffness: float = 1.0) -> tuple[Records, Records]:
+def drawn(random: np.random.Generator, nonlinear: bool, h: float, stiffness: float = 1.0) -> tuple[Structs, Structs]:
     """A group of blocks in motion: steps from next to nothing to one over p, rotations and speeds of all sizes."""
-    blocks, states = state.create_records(LANE_COUNT, state.BLOCK_DTYPE), state.create_states(LANE_COUNT, 0)
+    blocks, states = state.create_structs(LANE_COUNT, state.BLOCK_DTYPE), state.create_states(LANE_COUNT, 0)
     width = 10.0 ** random.uniform(-9.0, -1.4 if nonlinear else 0.0, LANE_COUNT)
     for k in range(LANE_COUNT):
         p, alpha = width[k] / h, 10.0 ** random.uniform(-2.0, 0.0)
@@ -220,13 +220,13 @@ WEIGHTS = {
 
 def weighted_cases(
     random: np.random.Generator, nonlinear: bool, kind: str, substeps: int
-) -> tuple[Records, Records, ValueAndSlope, ValueAndSlope]:
+) -> tuple[Structs, Structs, ValueAndSlope, ValueAndSlope]:
     """A group of blocks in motion, the push and the weight over a step of one second."""
     low, high, swing = WEIGHTS[kind]
     weight = (random.uniform(low, high), random.normal() * swing)
     heaviest = max(1.0, abs(weight[0]), abs(sum(weight)))
     longest = substeps * (MAX_SUBSTEP if nonlinear else MAX_WEIGHTED_SUBSTEP) / math.sqrt(heaviest)
-    blocks, states = state.create_records(LANE_COUNT, state.BLOCK_DTYPE), state.create_states(LANE_COUNT, 0)
+    blocks, states = state.create_structs(LANE_COUNT, state.BLOCK_DTYPE), state.create_states(LANE_COUNT, 0)
     for k in range(LANE_COUNT):
         p, alpha = longest * 10.0 ** random.choice([0.0, random.uniform(-9.0, 0.0)]), 10.0 ** random.uniform(-2.0, 0.0)
         blocks[k] = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
@@ -267,9 +267,9 @@ def test_a_quiet_step_is_exact_while_the_weight_changes(
     assert quiet > 7 * rounds
 
 
-def shapes(random: np.random.Generator, h: float, nonlinear: bool) -> tuple[Records, Records]:
+def shapes(random: np.random.Generator, h: float, nonlinear: bool) -> tuple[Structs, Structs]:
     """Steps with turning points: down to nearly nothing and up again, up to nearly the highest and down again."""
-    blocks, states = state.create_records(LANE_COUNT, state.BLOCK_DTYPE), state.create_states(LANE_COUNT, 0)
+    blocks, states = state.create_structs(LANE_COUNT, state.BLOCK_DTYPE), state.create_states(LANE_COUNT, 0)
     for k in range(LANE_COUNT):
         alpha = 0.2
         p = random.uniform(0.05, 1.0) * (0.02 if nonlinear else 1.0) / h
@@ -321,8 +321,8 @@ def test_a_lane_is_quiet_only_if_nothing_happens_in_its_step(nonlinear: bool, we
 P, ALPHA, H = 0.5, 0.2, 0.005
 
 
-def one(u: float, v: float, peak: float, *, nonlinear: bool = False) -> tuple[Records, Records]:
-    blocks, states = state.create_records(1, state.BLOCK_DTYPE), state.create_states(1, 0)
+def one(u: float, v: float, peak: float, *, nonlinear: bool = False) -> tuple[Structs, Structs]:
+    blocks, states = state.create_structs(1, state.BLOCK_DTYPE), state.create_states(1, 0)
     blocks[0] = rocking_block((P, P), (ALPHA, ALPHA), nonlinear=nonlinear)
     states[0] = state_of(0, u, v, peak=peak)
     return blocks, states
@@ -382,7 +382,7 @@ def test_a_bulge_over_the_highest_so_far_between_two_ends_below_it_is_an_event(w
 def test_the_curvature_of_an_oscillator_may_be_largest_inside_a_step(up: float) -> None:
     """u = A cos(omega (t - h/2)) - c over a step of one radian: bulges by A (1 - cos(1/2))."""
     a, beyond = up, 1.0 - math.cos(0.5)
-    blocks, states = state.create_records(1, state.BLOCK_DTYPE), state.create_states(1, 0)
+    blocks, states = state.create_structs(1, state.BLOCK_DTYPE), state.create_states(1, 0)
     for share, quiet in ((0.95, False), (1.06, True)):
         u = 1.0 if up > 0.0 else share * beyond
         pull = (a * math.cos(0.5) - u) / H**2

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_records import MINUS, NO_GROUND, PLUS, ULP, Pair, in_units_of_g, long_uncompiled, rocking_block, rules_for
+from kernel_structs import MINUS, NO_GROUND, PLUS, ULP, Pair, in_units_of_g, long_uncompiled, rocking_block, rules_for
 from numpy.testing import assert_array_equal
 
 from rocking.kernels import state
 from rocking.kernels.ground import Ground
 from rocking.kernels.march import march
-from rocking.kernels.state import Record, Records, create_scratch, create_states
+from rocking.kernels.state import Struct, Structs, create_scratch, create_states
 from rocking.kernels.trace import Trail, trace
 
 quick = settings(deadline=None, max_examples=40)
@@ -22,12 +22,12 @@ quick = settings(deadline=None, max_examples=40)
 class Run(NamedTuple):
     """What a march wrote, and how it ended."""
 
-    ending: int
-    nodes: Records
-    impacts: Records
-    events: Records
-    sequences: Records
-    at: Record
+    status: int
+    nodes: Structs
+    impacts: Structs
+    events: Structs
+    sequences: Structs
+    at: Struct
     trail: Trail
 
     @property
@@ -56,7 +56,7 @@ def with_rows(ground: Ground, rows: np.ndarray) -> Ground:
     return in_units_of_g(ground.pieces[:, 0], rows)
 
 
-def started(rotation: float = 0.0, velocity: float = 0.0) -> Record:
+def started(rotation: float = 0.0, velocity: float = 0.0) -> Struct:
     """State at time zero of a block at rest, or thrown off it."""
     at = create_states(1, 10**6)[0]
     if rotation != 0.0 or velocity != 0.0:
@@ -80,25 +80,25 @@ def run(
     velocity: float = 0.0,
     rows: int = 4096,
     keep: bool = True,
-    block: Record | None = None,
+    block: Struct | None = None,
 ) -> Run:
     if block is None:
         block = rocking_block(p, alpha, e, nonlinear=nonlinear, limit=limit)
     rules = rules_for(nonlinear=nonlinear, rest_rule=rest_rule, stop=stop, writes_tables=keep)
     table, at, scratch = state.create_table(rows), started(rotation, velocity), create_scratch()
-    ending = march(ground, block, rules, table, scratch, at)
-    while ending == state.Ending.FULL and len(table) < 200_000:
+    status = march(ground, block, rules, table, scratch, at)
+    while status == state.MarchStatus.FULL and len(table) < 200_000:
         table = state.enlarge_table(table)
-        ending = march(ground, block, rules, table, scratch, at)
+        status = march(ground, block, rules, table, scratch, at)
     nodes = table["node"][: at["nodes"]].copy()
     kept = (table[name][: at[name + "s"] if keep else 0] for name in ("impact", "event", "sequence"))
-    return Run(ending, nodes, *kept, at, Trail(ground, block, rules, state.expose_fields(nodes)))
+    return Run(status, nodes, *kept, at, Trail(ground, block, rules, state.expose_fields(nodes)))
 
 
 def assert_sound(found: Run) -> None:
     """Time never runs backwards, the block is never below the ground, and no NaN has come in."""
     nodes, impacts = found.nodes, found.impacts
-    assert found.ending in (state.Ending.DONE, state.Ending.OVERTURNED)
+    assert found.status in (state.MarchStatus.DONE, state.MarchStatus.OVERTURNED)
     assert all(np.all(np.isfinite(nodes[name])) for name in nodes.dtype.names)
     assert np.all(np.diff(nodes["time"]) >= -2.0 * ULP * nodes["time"][1:])
     assert np.all(nodes["u"] >= 0.0)
@@ -109,7 +109,7 @@ def assert_sound(found: Run) -> None:
 
 def assert_same(one: Run, other: Run) -> None:
     """Bit for bit."""
-    assert one.ending == other.ending
+    assert one.status == other.status
     for name in ("nodes", "impacts", "events", "sequences"):
         assert_array_equal(getattr(one, name), getattr(other, name))
 
@@ -145,19 +145,19 @@ def test_a_march_writes_into_its_table_and_never_behind_it(nonlinear: bool, colu
         table, at = state.create_table(size + 5), started()
         table.view(np.uint8)[:] = 0xA5
         guard = table[size:].tobytes()
-        ending = march(ground, block, rules, table[:size], scratch, at)
+        status = march(ground, block, rules, table[:size], scratch, at)
         assert table[size:].tobytes() == guard
-        while ending == state.Ending.FULL:
+        while status == state.MarchStatus.FULL:
             size *= 2
-            grown = state.create_records(max(size, 8) + 5, state.TABLE_DTYPE)
+            grown = state.create_structs(max(size, 8) + 5, state.TABLE_DTYPE)
             grown.view(np.uint8)[:] = 0xA5
             grown[: len(table) - 5] = table[: len(table) - 5]
             size = max(size, 8)
             table = grown
             guard = table[size:].tobytes()
-            ending = march(ground, block, rules, table[:size], scratch, at)
+            status = march(ground, block, rules, table[:size], scratch, at)
             assert table[size:].tobytes() == guard
-        assert (ending, at) == (whole.ending, whole.at)
+        assert (status, at) == (whole.status, whole.at)
         assert_array_equal(table["node"][: at["nodes"]], whole.nodes)
         assert_array_equal(table["impact"][: at["impacts"]], whole.impacts)
 
@@ -169,7 +169,7 @@ def test_a_march_in_slices_is_the_march_in_one(nonlinear: bool, budget: int) -> 
     whole = run(ground, nonlinear=nonlinear)
     table, at, scratch, pauses = state.create_table(4096), started(), create_scratch(), 0
     at["budget"] = budget
-    while march(ground, block, rules, table, scratch, at) == state.Ending.PAUSED:
+    while march(ground, block, rules, table, scratch, at) == state.MarchStatus.PAUSED:
         at["budget"] = budget
         pauses += 1
     assert pauses > 1
@@ -185,10 +185,10 @@ def test_a_march_from_piece_to_piece_is_the_march_in_one(nonlinear: bool) -> Non
     table, at, scratch = state.create_table(4096), started(), create_scratch()
     for until in [*range(1, len(ground.pieces)), state.NO_STOP_PIECE]:
         at["stop_piece"] = until
-        ending = march(ground, block, rules, table, scratch, at)
+        status = march(ground, block, rules, table, scratch, at)
         is_stopped = until < state.NO_STOP_PIECE and at["piece"] >= until
-        assert ending == (state.Ending.RUNNING if is_stopped else whole.ending)
-        if ending != state.Ending.RUNNING:
+        assert status == (state.MarchStatus.RUNNING if is_stopped else whole.status)
+        if status != state.MarchStatus.RUNNING:
             break
     assert_array_equal(table["impact"][: at["impacts"]], whole.impacts)
     assert_array_equal(table["event"][: at["events"]], whole.events)
@@ -204,7 +204,7 @@ def test_recording_or_not_gives_the_same_bits(nonlinear: bool, columns: int) -> 
         ground = with_rows(record(seed), rows)
         kept = run(ground, nonlinear=nonlinear)
         state_alone = run(ground, nonlinear=nonlinear, rows=0, keep=False)
-        assert kept.ending == state_alone.ending
+        assert kept.status == state_alone.status
         for name in state.STATE_DTYPE.names:
             if name not in ("nodes", "budget"):
                 assert kept.at[name] == state_alone.at[name], name
@@ -232,7 +232,7 @@ def test_a_motion_of_one_piece_may_uplift_at_its_very_start(row: list[float]) ->
     found = run(in_units_of_g([0.0, 0.2], [row]))
     assert found.events[0].tolist() == (0.0, state.EventKind.UPLIFT, -1)
     assert found.kinds == [state.EventKind.UPLIFT, state.EventKind.REST]
-    assert found.ending == state.Ending.DONE
+    assert found.status == state.MarchStatus.DONE
     assert_sound(found)
 
 
@@ -282,7 +282,7 @@ def test_a_march_stops_in_an_arc_at_rest_and_exactly_at_an_impact(nonlinear: boo
     middle = 0.5 * (whole.impacts["time"][5] + whole.impacts["time"][6])
     for stop in (middle, impact, rest + 0.5, 1e3, whole.nodes["time"][7], whole.events["time"][0]):
         found = run(record(1), nonlinear=nonlinear, stop=stop)
-        assert (found.ending, found.at["end_time"]) == (state.Ending.DONE, stop)
+        assert (found.status, found.at["end_time"]) == (state.MarchStatus.DONE, stop)
         before = whole.impacts[whole.impacts["time"] < stop]
         assert_array_equal(found.impacts[: len(before)], before)
         assert len(found.impacts) - len(before) in ((0, 1) if stop == impact else (0,))
@@ -295,7 +295,7 @@ def test_a_march_may_stop_between_the_last_impact_resolved_and_rest() -> None:
     last, rest = whole.impacts["time"][-1], whole.events["time"][-1]
     assert rest > last
     found = run(NO_GROUND, velocity=0.1, stop=0.5 * (last + rest))
-    assert (found.ending, found.kinds) == (state.Ending.DONE, [])
+    assert (found.status, found.kinds) == (state.MarchStatus.DONE, [])
     assert found.sequences["lower"][0] <= rest <= found.sequences["upper"][0]
     assert_array_equal(found.traced(np.linspace(last, found.at["end_time"], 9)[2:]), np.zeros((7, 3)))
 
@@ -304,7 +304,7 @@ def test_a_march_may_stop_between_the_last_impact_resolved_and_rest() -> None:
 @pytest.mark.parametrize("nonlinear", [False, True])
 def test_without_loss_the_block_rocks_on_until_the_stop(nonlinear: bool) -> None:
     found = run(NO_GROUND, velocity=0.1, e=(1.0, 1.0), nonlinear=nonlinear, stop=50.0)
-    assert (found.ending, found.at["end_time"], len(found.sequences)) == (state.Ending.DONE, 50.0, 0)
+    assert (found.status, found.at["end_time"], len(found.sequences)) == (state.MarchStatus.DONE, 50.0, 0)
     assert np.max(np.abs(found.impacts["speed_after"] - 0.1)) <= 1e-13
     assert np.ptp(np.diff(found.impacts["time"])) <= 1e-12
     assert_sound(found)
@@ -312,10 +312,10 @@ def test_without_loss_the_block_rocks_on_until_the_stop(nonlinear: bool) -> None
 
 def test_a_block_on_its_corner_balances() -> None:
     for nonlinear in (False, True):
-        assert run(NO_GROUND, rotation=0.15, nonlinear=nonlinear).ending == state.Ending.BALANCED
-        assert run(NO_GROUND, rotation=0.15, nonlinear=nonlinear, stop=9.0).ending == state.Ending.DONE
+        assert run(NO_GROUND, rotation=0.15, nonlinear=nonlinear).status == state.MarchStatus.BALANCED
+        assert run(NO_GROUND, rotation=0.15, nonlinear=nonlinear, stop=9.0).status == state.MarchStatus.DONE
         fallen = run(NO_GROUND, rotation=0.15 * (1.0 + ULP), nonlinear=nonlinear)
-        assert (fallen.ending, fallen.kinds) == (state.Ending.OVERTURNED, [state.EventKind.OVERTURN])
+        assert (fallen.status, fallen.kinds) == (state.MarchStatus.OVERTURNED, [state.EventKind.OVERTURN])
         assert fallen.at["peak"] == 0.5 * math.pi
         assert fallen.at["peak_time"] == fallen.at["end_time"] == fallen.events["time"][0]
 
@@ -334,7 +334,11 @@ def test_intervals_that_time_can_no_longer_tell_apart_end_a_sequence() -> None:
 )
 def test_other_rest_rules_end_a_sequence_at_their_threshold(rest_rule: int, limit: float) -> None:
     found = run(NO_GROUND, velocity=0.1, rest_rule=rest_rule, limit=limit)
-    assert (found.ending, found.kinds, found.at["rests_by_rounding"]) == (state.Ending.DONE, [state.EventKind.REST], 0)
+    assert (found.status, found.kinds, found.at["rests_by_rounding"]) == (
+        state.MarchStatus.DONE,
+        [state.EventKind.REST],
+        0,
+    )
     measure = {
         state.RestRule.VELOCITY: -found.impacts["speed_after"],
         state.RestRule.INTERVAL: -np.diff(found.impacts["time"], prepend=0.0),
@@ -368,7 +372,7 @@ def test_an_impact_without_speed_ends_at_rest_and_poisons_nothing() -> None:
     found = run(in_units_of_g([0.0, 2.0], [row]), rotation=0.1, velocity=-0.3)
     assert len(found.impacts) > 0
     assert found.impacts["speed_before"][0] <= 1e-7
-    assert found.ending in (state.Ending.DONE, state.Ending.OVERTURNED)
+    assert found.status in (state.MarchStatus.DONE, state.MarchStatus.OVERTURNED)
     assert all(np.all(np.isfinite(found.nodes[name])) for name in found.nodes.dtype.names)
 
 

@@ -5,13 +5,13 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from kernel_records import NO_GROUND, ULP, in_units_of_g, one_sided, rules_for, state_of
+from kernel_structs import NO_GROUND, ULP, in_units_of_g, one_sided, rules_for, state_of
 from test_kernels_march import Run, run
 
 from rocking.kernels import state
 from rocking.kernels.certificate import Proof, prove_rest
 from rocking.kernels.ground import Ground
-from rocking.kernels.state import Record, create_scratch
+from rocking.kernels.state import Struct, create_scratch
 from rocking.kernels.uplift import find_next_uplift
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -22,7 +22,7 @@ mp = mpmath.mp.clone()
 mp.dps = 40
 
 
-def ball(e: float) -> Record:
+def ball(e: float) -> Struct:
     """u'' = -(g + table's acceleration)."""
     return one_sided(0.0, G, 1.0, e)
 
@@ -37,7 +37,7 @@ def sine_table(amplitude: float, frequency: float, duration: float, width: float
     return in_units_of_g([*starts, starts[-1] + width], rows)
 
 
-def thrown(ground: Ground, block: Record, v: float, u: float = 0.0, **rules: float) -> Run:
+def thrown(ground: Ground, block: Struct, v: float, u: float = 0.0, **rules: float) -> Run:
     return run(ground, block=block, velocity=v, rotation=u, **rules)
 
 
@@ -90,7 +90,7 @@ def test_a_ball_without_any_motion_of_the_table_needs_no_piece_of_it() -> None:
         found = thrown(NO_GROUND, ball(0.5), 1.0, u)
         first = (1.0 + math.sqrt(1.0 + 2.0 * G * u)) / G
         speed = math.sqrt(1.0 + 2.0 * G * u)
-        assert found.ending == state.Ending.DONE
+        assert found.status == state.MarchStatus.DONE
         assert found.impacts["time"][0] == pytest.approx(first, rel=1e-14)
         assert found.events["time"][-1] == pytest.approx(first + 2.0 * 0.5 * speed / (G * 0.5), rel=1e-13)
 
@@ -119,7 +119,7 @@ def test_a_table_that_falls_away_faster_than_the_ball_lets_it_fly() -> None:
 OMEGA = 3.0
 
 
-def oscillator(e: float, pressed: float = 1.0) -> Record:
+def oscillator(e: float, pressed: float = 1.0) -> Struct:
     """Pressed against its stop by a constant force."""
     return one_sided(-OMEGA * OMEGA, pressed, 1.0, e)
 

@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from kernel_records import in_units_of_g, long_uncompiled, rocking_block, rules_for, state_of
+from kernel_structs import in_units_of_g, long_uncompiled, rocking_block, rules_for, state_of
 from numpy.testing import assert_array_equal
 from test_kernels_march import Run, record, run, with_rows
 
 from rocking.kernels import state
 from rocking.kernels.ground import Ground
 from rocking.kernels.rest import apply_proven_impacts
-from rocking.kernels.state import PROVEN_PER_ITERATION, Record, has_space
+from rocking.kernels.state import PROVEN_PER_ITERATION, Struct, has_space
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -23,14 +23,14 @@ def one_by_one(ground: Ground) -> Ground:
     return with_rows(ground, rows)
 
 
-def passed(ground: Ground, start: Record, *, rows: int = 100, left: float = 9.0, e: float = 0.9) -> Record:
+def passed(ground: Ground, start: Struct, *, rows: int = 100, left: float = 9.0, e: float = 0.9) -> Struct:
     """State after the impacts that can be passed."""
     table = state.create_table(rows)
     apply_proven_impacts(ground, rocking_block(e=(e, e)), rules_for(), table, start, left)
     return start
 
 
-def proven(v: float, *, peak: float = 1.0, proof_speed: float = 1e-5, offset: float = 0.0) -> Record:
+def proven(v: float, *, peak: float = 1.0, proof_speed: float = 1e-5, offset: float = 0.0) -> Struct:
     """Just after an impact from which chattering has been proven."""
     return state_of(0, 0.0, v, peak=peak, certificate_speed=proof_speed, proven_impacts=1, offset=offset)
 

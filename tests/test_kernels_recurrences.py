@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
-from kernel_records import ULP, in_units_of_g, one_sided, rocking_block, rules_for, state_of
+from kernel_structs import ULP, in_units_of_g, one_sided, rocking_block, rules_for, state_of
 from oracles.taylor import Line, Number, System, coefficients, mp
 
 from rocking.core.arrays import Floats
@@ -21,7 +21,7 @@ from rocking.kernels.series import (
     write_angle_coefficients,
     write_linear_coefficients,
 )
-from rocking.kernels.state import ORDER, Record, create_scratch
+from rocking.kernels.state import ORDER, Struct, create_scratch
 from rocking.kernels.trace import Quantity, Trail, expand_variation
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -31,14 +31,14 @@ Series = list[float]
 Form = Callable[[System, Start, Line, Line], Series]
 
 
-def body(system: System) -> Record:
+def body(system: System) -> Struct:
     """Something with this equation on side 0, whatever it is elsewhere."""
     made = one_sided(system.lam, float(system.gained), system.alpha, 0.5)
     made["slenderness"] = system.alpha
     return made
 
 
-def scratch_with(push: Line, weight: Line) -> Record:
+def scratch_with(push: Line, weight: Line) -> Struct:
     scratch = create_scratch()
     scratch["ground"][:2], scratch["weight"][:2] = push, weight
     return scratch
@@ -199,9 +199,9 @@ def test_the_variation_along_an_arc_is_the_derivative_by_what_is_changed(
         lift = random.uniform(-0.5, 0.5, degree + 1) / h ** np.arange(degree + 1.0) if weighted else np.zeros(1)
         block = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
         ground = in_units_of_g([0.0, 9.0], [push], vertical=[lift] if weighted else None)
-        trail = Trail(ground, block, rules_for(nonlinear=nonlinear), state.create_records(0, state.NODE_DTYPE))
-        node = state.create_record(state.NODE_DTYPE, time=0.0, piece=0, offset=0.0, side=side, u=u, v=v)
-        work = state.create_record(state.VARIATION_DTYPE)
+        trail = Trail(ground, block, rules_for(nonlinear=nonlinear), state.create_structs(0, state.NODE_DTYPE))
+        node = state.create_struct(state.NODE_DTYPE, time=0.0, piece=0, offset=0.0, side=side, u=u, v=v)
+        work = state.create_struct(state.VARIATION_DTYPE)
         order = expand_variation(trail, create_scratch(), work, node, quantity, (du, dv, 0.0), h)
         name, _, of_side = quantity.name.partition("_")
         of_this = Quantity[name] if of_side in ("", ("PLUS", "MINUS")[side]) else Quantity.NOTHING

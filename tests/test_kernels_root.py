@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_records import ULP
+from kernel_structs import ULP
 from oracles.exact import as_float, exact, polynomial, real_roots
 
 from rocking.kernels.events import bound_curvature, find_first_root

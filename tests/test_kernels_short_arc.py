@@ -9,7 +9,7 @@ import pytest
 from flint import fmpq_poly
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_records import ULP, in_units_of_g, long_uncompiled, rocking_block, rules_for, state_of
+from kernel_structs import ULP, in_units_of_g, long_uncompiled, rocking_block, rules_for, state_of
 from oracles.exact import exact, real_roots
 from oracles.taylor import System, after
 
@@ -17,7 +17,7 @@ from rocking.kernels.arc import evaluate_series, expand_arc
 from rocking.kernels.events import StepEnd, advance_to_event
 from rocking.kernels.series import ValueAndSlope
 from rocking.kernels.short_arc import take_short_step
-from rocking.kernels.state import Record, StepOutcome, create_scratch
+from rocking.kernels.state import StepOutcome, Struct, create_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
@@ -47,10 +47,10 @@ class Case:
         self.rules = rules_for(nonlinear=nonlinear)
         self.scratch = create_scratch()
 
-    def short(self, start: Record, left: float) -> StepEnd:
+    def short(self, start: Struct, left: float) -> StepEnd:
         return take_short_step(self.ground, self.block, self.rules, start, left)
 
-    def long(self, start: Record, left: float) -> tuple[StepEnd, float]:
+    def long(self, start: Struct, left: float) -> tuple[StepEnd, float]:
         """StepEnd, and how far the series reaches."""
         order, h, _ = expand_arc(self.ground, self.block, self.rules, self.scratch, start, left)
         return advance_to_event(start, self.scratch, order, h, self.block["overturn_angle"]), h
@@ -177,7 +177,7 @@ def test_the_first_impact_is_never_missed() -> None:
     assert judged[StepOutcome.UNDECIDED] <= 0.6 * sum(judged.values()), judged
 
 
-def lower_than_before(case: Case, u: float, v: float, peak: float = 9.0) -> Record:
+def lower_than_before(case: Case, u: float, v: float, peak: float = 9.0) -> Struct:
     """State of a block that has been higher."""
     return state_of(case.side, u, v, peak=peak)
 

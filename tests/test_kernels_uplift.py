@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_records import MINUS, PLUS, ULP, in_units_of_g, numbers, rocking_block
+from kernel_structs import MINUS, PLUS, ULP, in_units_of_g, numbers, rocking_block
 from oracles.exact import exact, first_above, polynomial
 
 from rocking.kernels.ground import Ground

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from kernel_records import Pair, block_of, ground_of, rules_for
+from kernel_structs import Pair, block_of, ground_of, rules_for
 from oracles import multiprecision
 from oracles.cases import GRAVITY
 from oracles.problem import Problem
@@ -14,14 +14,14 @@ import rocking
 from rocking.core.constants import Model
 from rocking.kernels import state
 from rocking.kernels.arc import compute_restoring
-from rocking.kernels.state import Record
+from rocking.kernels.state import Struct
 from rocking.kernels.trace import Quantity, Trail, compute_rest_shift
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
 
-def node_of(side: int, u: float, v: float, time: float = 0.0) -> Record:
-    return state.create_record(state.NODE_DTYPE, time=time, piece=0, offset=time, side=side, u=u, v=v)
+def node_of(side: int, u: float, v: float, time: float = 0.0) -> Struct:
+    return state.create_struct(state.NODE_DTYPE, time=time, piece=0, offset=time, side=side, u=u, v=v)
 
 
 @pytest.mark.cases(fast=8)
@@ -51,7 +51,7 @@ def test_the_shift_of_the_rest_is_its_derivative_by_what_is_changed(model: str, 
     block = block_of(problem)
     dv = faster + compute_restoring(ground_of(problem), block, side, 0, start) * shift
     trail = Trail(
-        ground_of(problem), block, rules_for(nonlinear=model == "nonlinear"), state.create_records(0, state.NODE_DTYPE)
+        ground_of(problem), block, rules_for(nonlinear=model == "nonlinear"), state.create_structs(0, state.NODE_DTYPE)
     )
     # What happens to the speed at the impact itself is in dv.
     node, later = node_of(side, 0.0, v, start), node_of(state.AT_REST, 0.0, 0.0, start + 1e-4)

@@ -179,7 +179,7 @@ def test_only_the_larger_response_of_a_pair_counts(pairs: tuple[Motion, ...]) ->
         assert row.motion in (first.name, second.name)
     assert outcomes.overturned.tolist() == expected and 0 < sum(expected) < len(expected)
     assert (curve.exceeded.sum(), curve.trials.sum()) == (sum(expected), len(expected))
-    assert result.description.endswith("the larger response") and curve.clusters == 3
+    assert result.description.endswith("the larger response") and curve.cluster_count == 3
     shuffled = fragility(BLOCK, [pairs[k] for k in (0, 2, 5, 1, 4, 3)], measure=ROTATED, levels=LEVELS, larger=True)
     assert shuffled.curves[0].exceeded.sum() == curve.exceeded.sum()
 
@@ -191,7 +191,7 @@ def test_a_fragility_meets_the_hazard_curve_in_its_own_component(pairs: tuple[Mo
     assert fitted.annual_rate(HazardCurve.read(file, component="rotd50")).rates[0].annual_rate > 0.0
     with pytest.raises(OptionError, match=r"must have the same measure; got peak ground acceleration, RotD50 \(g\)"):
         fitted.annual_rate(HazardCurve.read(file))
-    assert fitted.curves[0].clusters == 3  # components of a pair are dependent
+    assert fitted.curves[0].cluster_count == 3  # components of a pair are dependent
     assert fitted.to_dict()["measure"] == {"name": "pga", "units": "m/s^2", "component": "rotd50"}
 
 

@@ -204,4 +204,4 @@ def test_an_incremental_analysis_counts_the_undecided_outcomes_of_a_sample():
     levels = np.array([0.53, 0.54, 0.55, 0.6]) * 9.80665
     found = rocking.incremental_dynamic_analysis(FREE, UNDECIDED, levels=levels, rtol=0.01)
     text = "undecided within 3e-6 of the motion: 2 of a sample of 4 outcomes"
-    assert f"note: {text}" in found.summary() and found.to_dict()["undecided"] == text
+    assert f"note: {text}" in found.summary() and found.to_dict()["undecided_note"] == text

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from kernel_records import rocking_block
+from kernel_structs import rocking_block
 
 import rocking
 from rocking import Block, Restitution, RestrainedBlock, dynamics, impact_restitution, one_sided_restitution

@@ -106,7 +106,7 @@ def test_what_is_known_in_closed_form():
     stiffness = 3e5
     tied = RestrainedBlock(column, Tendon(stiffness))
     assert tied.uplift_thresholds() == pytest.approx(free, rel=1e-15)
-    record = tied.as_bodies().create_kernel_records("linear", np.zeros((1, 2)))[0]
+    record = tied.as_bodies().create_kernel_structs("linear", np.zeros((1, 2)))[0]
     own, inertia = column.p**2, 4000.0 * column.radius**2 * 4.0 / 3.0
     rate = own * (1.0 + record["added_weight"]) - own  # Makris and Vassiliou (2015): less stiffness x^2/I
     assert rate == pytest.approx(-stiffness * 0.25**2 / inertia)
@@ -272,6 +272,6 @@ def test_blocks_of_all_kinds_are_simulated_together_as_alone():
     )
     limits = np.zeros((4, 2))
     for model in ("nonlinear", "linear"):
-        assert np.array_equal(again.create_kernel_records(model, limits), gathered.create_kernel_records(model, limits))
+        assert np.array_equal(again.create_kernel_structs(model, limits), gathered.create_kernel_structs(model, limits))
     with pytest.raises(BlockError, match="blocks have no parameter stif; the terms of restraints are sine, cosine"):
         rocking.Blocks(1.0, 0.2, 0.9, stif=3.0)

@@ -108,7 +108,7 @@ def test_a_study_leaves_out_what_was_given_up(tmp_path):
     missing = int(direct.outcomes.unfinished.sum())
     text = f"{missing} simulations given up after too many steps: outcomes missing"
     together, each, spectrum = study.fragility(measure="pga"), study.block_fragilities(measure="pga"), study.spectrum()
-    assert together.missing == direct.missing == text
+    assert together.missing_note == direct.missing_note == text
     assert together.curves[0].median == pytest.approx(direct.curves[0].median, rel=1e-9)
     assert each.data.outcomes.values[0].tolist() == [20.0, 20.0 - missing]
     for found in (together, each, spectrum):
@@ -249,11 +249,11 @@ def test_whatever_draws_itself_does_so_at_the_size_that_is_wanted(results, every
 
 PULSES = "pulse_amplitude_m_s2,pulse_frequency_Hz,pulse_cycles,pulse_phase_rad"
 HEADERS = {
-    ("Basins", "attractors"): "attractor,share,standard_error,period,impacts,rests,multiplier",
+    ("Basins", "attractors"): "attractor,share,standard_error,period,impact_count,has_rest,multiplier",
     ("Basins", "outcomes"): "angular_velocity_rad_s,rotation_rad,outcome,periods",
     ("Basins", "orbits"): "attractor,phase,orbit_coordinate_rad,orbit_velocity_rad_s",
     ("BifurcationDiagram", "states"): "direction,value,start,iterate,coordinate_rad,velocity_rad_s",
-    ("BifurcationDiagram", "orbits"): "direction,value,start,period,impacts",
+    ("BifurcationDiagram", "orbits"): "direction,value,start,period,impact_count",
     (
         "ResistanceRose",
         "rose",

@@ -489,7 +489,7 @@ def test_counts_groups_and_motions_are_taken(tmp_path: Path) -> None:
     found = rocking.fit_fragility(**read_observed(path, Measure("pgv")))
     record = rocking.records.load("el-centro-meloland-270")
     assert found.curves[0].intensity[:2] == pytest.approx([record.pgv, 2.0 * record.pgv])
-    assert found.curves[0].clusters == 3
+    assert found.curves[0].cluster_count == 3
     with pytest.raises(OptionError, match="in units of the block"):
         read_observed(path, Measure("pgv_ratio"))
 

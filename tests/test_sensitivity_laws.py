@@ -72,7 +72,7 @@ def change(made, name, nonlinear, strength):
 def test_rotations_impacts_and_uplifts_change_with_everything_as_differences_say(name, model, monkeypatch):
     """From rest to either side, with a vertical component and without one."""
     body, judged, h = BODIES[name], {"rotation": 0, "impact": 0, "uplift": 0}, 1e-6
-    made = rocking.Blocks.create_kernel_records
+    made = rocking.Blocks.create_kernel_structs
     for sign in (1.0, -1.0):
         size = sign * 1.35 * max(each for each in body.uplift_thresholds(model) if np.isfinite(each))
         motion = rocking.pulses.sine(size, 0.9, cycles=2)
@@ -80,14 +80,14 @@ def test_rotations_impacts_and_uplifts_change_with_everything_as_differences_say
             motion = motion.with_vertical(rocking.pulses.sine(2.0, 1.7, cycles=2))
 
         def simulated(strength=0.0, of="motion", motion=motion):
-            def create_kernel_records(bodies, model, limits):
+            def create_kernel_structs(bodies, model, limits):
                 return change(made(bodies, model, limits), of, model == "nonlinear", strength)
 
             with monkeypatch.context() as patched:
                 if of == "motion":
                     motion = motion * (1.0 + strength)
                 else:
-                    patched.setattr(rocking.Blocks, "create_kernel_records", create_kernel_records)
+                    patched.setattr(rocking.Blocks, "create_kernel_structs", create_kernel_structs)
                 return rocking.simulate(body, motion, model=model, duration=motion.end)
 
         found = simulated()

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from kernel_records import in_units_of_g, rocking_block, rules_for, state_of
+from kernel_structs import in_units_of_g, rocking_block, rules_for, state_of
 from oracles.taylor import System, angles, coefficients, mp
 
 from rocking.kernels import arc, series

@@ -51,7 +51,7 @@ class FragilityCurve:
     intensity, exceeded, trials : ndarray, shape (n,)
         Data: number of outcomes that exceeded, and of trials, at each intensity. Weights of blocks lead to fractional
         numbers.
-    clusters : int
+    cluster_count : int
         Number of clusters of dependent outcomes (of motions for simulations).
     is_independent : bool
         Whether all outcomes are independent, as required by tests without clusters.
@@ -94,7 +94,7 @@ class FragilityCurve:
     fitted: Probit
     covariance: Floats
     confidence: float
-    clusters: int
+    cluster_count: int
     is_independent: bool
     log_likelihood: float
     goodness: probit.Goodness
@@ -187,7 +187,7 @@ class FragilityCurve:
             "confidence": self.confidence,
             "outcomes": round(float(self.trials.sum())),
             "exceeded": round(float(self.exceeded.sum())),
-            "clusters": self.clusters,
+            "cluster_count": self.cluster_count,
             "log_likelihood": self.log_likelihood,
             "goodness_statistic": self.goodness.statistic,
             "goodness_freedom": self.goodness.degrees_of_freedom,
@@ -231,7 +231,7 @@ def fit_curve(
         fitted=fitted,
         covariance=probit.compute_covariance(outcomes, fitted),
         confidence=confidence,
-        clusters=cluster_count,
+        cluster_count=cluster_count,
         is_independent=is_independent,
         log_likelihood=float(probit.compute_log_likelihood(outcomes.as_batch(), np.column_stack(fitted))[0]),
         goodness=probit.compute_goodness(outcomes, fitted, independent=is_independent),

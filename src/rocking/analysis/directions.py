@@ -175,7 +175,7 @@ class ResponseRose(DatasetResult):
     }
     AGGREGATED_DIMENSIONS = ("pair", "azimuth")
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         data = self.data
         counts = f"{format_count(data.sizes['pair'], 'pair')}, {format_count(data.sizes['azimuth'], 'azimuth')}"
         return f"{data.description}, {data.model} model: share overturned, {counts}"
@@ -196,7 +196,7 @@ class ResponseRose(DatasetResult):
             rows.append([name, shares.min(), shares.max(), azimuth_text, float(data.anywhere[k])])
         table = format_table(["level", "least share", "largest share", "at", "at any azimuth"], rows)
         notes = list_missing_notes(np.isnan(data.peak_over_slenderness.values))
-        return "\n".join([self._headline(), "", table, *notes])
+        return "\n".join([self._format_headline(), "", table, *notes])
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data
@@ -226,7 +226,7 @@ class ResponseRose(DatasetResult):
             azimuth=full_circle[order],
             shares=np.concatenate([shares, shares[:, is_new]], axis=1)[:, order],
             labels=[level_names[k] for k in indices],
-            title=title or escape_dollars(self._headline()),
+            title=title or escape_dollars(self._format_headline()),
             ax=ax,
             figsize=figsize,
         )

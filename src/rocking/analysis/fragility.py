@@ -94,7 +94,7 @@ class Fragility(Result):
         are pooled.
     source : str
         Meaning of a cluster of outcomes: "motion" or "cluster".
-    undecided, missing : str
+    undecided_note, missing_note : str
         Number of outcomes in a sample that change within 3e-6 of the motion, and of abandoned (excluded) simulations,
         or empty.
 
@@ -124,8 +124,8 @@ class Fragility(Result):
     includes_vertical: bool = False
     has_several_blocks: bool = False
     source: str = "motion"
-    undecided: str = ""
-    missing: str = ""
+    undecided_note: str = ""
+    missing_note: str = ""
 
     def summary(self) -> str:
         scale = self.measure.display_factor
@@ -151,7 +151,7 @@ class Fragility(Result):
     @property
     def notes(self) -> tuple[str, ...]:
         """Limitations of the curves (small samples, poor fits, undecided outcomes), one sentence each."""
-        notes = [message for message in (self.missing, self.undecided) if message]
+        notes = [message for message in (self.missing_note, self.undecided_note) if message]
         if self.is_one_way:
             notes.append(
                 "the sides differ, and motions came in one polarity only: reversed ones give another curve; "
@@ -175,7 +175,7 @@ class Fragility(Result):
 
     @property
     def _few_clusters_text(self) -> str:
-        count = format_count(self.curves[0].clusters, self.source)
+        count = format_count(self.curves[0].cluster_count, self.source)
         return f"{count} cannot tell how far {self.source}s differ; give 3 or more"
 
     def to_dict(self) -> dict[str, Any]:
@@ -189,7 +189,7 @@ class Fragility(Result):
             "outcomes": None if self.outcomes is None else self.outcomes.to_dict("records"),
         }
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         curves = ", ".join(
             f"{curve.limit_state}: median {format_intensity(curve.median, self.measure)}, "
             f"dispersion {curve.dispersion:.3g}"
@@ -460,6 +460,7 @@ def fragility(
     factors = np.asarray(scales)[..., None] * np.array(POLARITY_SIGNS[options["polarity"]])
     setup = Setup(bodies, model, chattering_scheme(chattering), friction=resolve_friction(friction))
     kind = "cloud" if levels is None else format_count(len(intensity), "stripe")
+    missing_notes = describe_missing(table.unfinished.values), _describe_lost(has_lost_contact)
     text = f"{describe_pool(blocks, weights)}, {describe_sample(cluster_numbers, clusters)}, {kind}, {model} model"
     return Fragility(
         curves=tuple(curves),
@@ -474,8 +475,10 @@ def fragility(
         includes_vertical="vertical" in table.coords,
         has_several_blocks=bool(np.count_nonzero(block_weights) > 1),
         source="motion" if clusters is None else "cluster",
-        undecided=describe_undecided(setup, motions, factors, table.overturned.values),
-        missing="; ".join(filter(None, [describe_missing(table.unfinished.values), _describe_lost(has_lost_contact)])),
+        undecided_note=describe_undecided(setup, motions, factors, table.overturned.values),
+        missing_note="; ".join(
+            filter(None, [describe_missing(table.unfinished.values), _describe_lost(has_lost_contact)])
+        ),
     )
 
 

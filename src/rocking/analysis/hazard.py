@@ -191,7 +191,7 @@ class HazardCurve(Result):
         header = [self.measure.label, "annual rate", "return period (years)"]
         return format_table(header, [*zip(*columns, strict=True)])
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         low, high = convert_range(self)
         return (
             f"{self.name}; {self.measure.label} from {low:.4g} to {high:.4g}, "

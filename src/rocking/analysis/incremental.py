@@ -152,10 +152,10 @@ def incremental_dynamic_analysis(
     brackets = find_boundaries(table.level.values, flat_grid, simulate_overturned, rtol=relative_width)
     dataset = _combine_bands(table, flat_grid, brackets, slenderness, measure)
     scales = measure.find_factor(table.level.values[:, None, None] * units, values[:, None])
-    undecided = describe_undecided(setup, motion_list, scales[..., None], grid[..., None])
+    undecided_note = describe_undecided(setup, motion_list, scales[..., None], grid[..., None])
     sides_differ, block_text = int(not bodies.is_symmetric), describe_blocks(blocks)
     attributes = {"blocks": block_text, "lowest_uplift": lowest_uplift, "sides_differ": sides_differ}
-    return IncrementalDynamicAnalysis(dataset.assign_attrs(attributes, undecided=undecided))
+    return IncrementalDynamicAnalysis(dataset.assign_attrs(attributes, undecided_note=undecided_note))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -169,8 +169,8 @@ class IncrementalDynamicAnalysis(DatasetResult):
         smaller slenderness, infinite for overturning, NaN for abandoned simulations, which bands count as not
         overturning) and overturned. Over (motion, block): overturning_level, the lowest that overturns, or NaN if none
         or already the first does. Over (band): band_motion and band_block (positions), band_start and band_end, NaN
-        beyond the levels. Attributes: lowest_uplift, the lowest level that lifts a block, and undecided, the number of
-        outcomes in a sample that change within 3e-6 of the motion.
+        beyond the levels. Attributes: lowest_uplift, the lowest level that lifts a block, and undecided_note, the number
+        of outcomes in a sample that change within 3e-6 of the motion.
 
     See Also
     --------
@@ -229,7 +229,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         blocks = format_count(block_count, "block") if has_several_blocks else data.blocks
         table = format_table([coordinate, *(["block"] * has_several_blocks), "overturns"], rows)
         headline = f"{blocks}, {data.model} model; {data.level.label} that overturns"
-        notes = [*[f"note: {MIRROR_NOTE}"] * data.sides_differ, f"note: {data.undecided}"]
+        notes = [*[f"note: {MIRROR_NOTE}"] * data.sides_differ, f"note: {data.undecided_note}"]
         notes += list_missing_notes(np.isnan(data.peak_over_alpha.values))
         return "\n".join([headline, levels.summary(data.lowest_uplift), "", table, *notes])
 
@@ -245,7 +245,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
             **{name: data.level.attrs[name] for name in ("period", "damping", "component") if name in data.level.attrs},
             add_unit("level", units): data.level.values,
             add_unit("lowest_uplift", units): data.lowest_uplift,
-            "undecided": data.undecided,
+            "undecided_note": data.undecided_note,
             "motions": [
                 {
                     "name": str(data.motion.values[m]),

@@ -207,7 +207,7 @@ class Risk(Result):
             figsize=figsize,
         )
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         rates = ", ".join(f"{rate.limit_state}: {rate.describe_period()}" for rate in self.rates)
         return f"{self.description}; {self.hazard.name}; {rates}"
 
@@ -485,7 +485,7 @@ class Survival(Result):
             figsize=figsize,
         )
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         state, years = self.curve.limit_state, format_count(self.years, "year")
         return f"{state}: not in {years}; most likely never {self._describe_never}"
 

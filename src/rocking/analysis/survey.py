@@ -101,7 +101,7 @@ class BlocksUnderRecords(Result):
             return {name: title for name, title in names.items() if name in self._create_labels()[0]}
         return {"block": "block"}
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         """Summarise the number of records that overturn the block."""
         overturned = sum(response.overturned and response.perturbed().is_decided for response in self.responses)
         if len(self.bodies) > 1:
@@ -161,13 +161,13 @@ class Survey(BlocksUnderRecords):
         if any(row["processing"] for row in rows):
             titles = titles | {"processing": "done to the record"}
         table = format_table(list(titles.values()), [[row[name] for name in titles] for row in rows])
-        return f"{self._headline()}\n\n{table}"
+        return f"{self._format_headline()}\n\n{table}"
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         undecided = sum(item.stopped or item.unfinished or not item.perturbed().is_decided for item in self.responses)
         undecided_text = f", undecided under {undecided}" if undecided else ""
         skipped_text = f"; {format_count(len(self.skipped), 'record')} skipped" if self.skipped else ""
-        return super()._headline() + undecided_text + skipped_text
+        return super()._format_headline() + undecided_text + skipped_text
 
     def to_dict(self) -> dict[str, Any]:
         blocks = []
@@ -249,7 +249,7 @@ class RuleComparison(BlocksUnderRecords):
         )
         counts = ["", *self._count_disagreements(rules)] if rules else []
         notes = (f"note: {note}" for note in self._list_notes())
-        heading = str(self.bodies[0]) if len(self.bodies) == 1 else self._headline()
+        heading = str(self.bodies[0]) if len(self.bodies) == 1 else self._format_headline()
         return "\n".join([heading, explanation, "", table, *counts, *notes])
 
     def to_dict(self) -> dict[str, Any]:
@@ -258,8 +258,8 @@ class RuleComparison(BlocksUnderRecords):
     def _list_notes(self) -> list[str]:
         return [] if all(body.as_bodies().is_symmetric for body in self.bodies) else [MIRROR_NOTE]
 
-    def _headline(self) -> str:
-        return f"{super()._headline()}; by {', '.join(self.ratios[0]) or 'no rule'}"
+    def _format_headline(self) -> str:
+        return f"{super()._format_headline()}; by {', '.join(self.ratios[0]) or 'no rule'}"
 
     def _count_disagreements(self, rules: list[str]) -> list[str]:
         """Count the errors of each rule, without records for which no single number can be right."""

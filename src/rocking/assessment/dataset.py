@@ -34,7 +34,7 @@ _INTENSITY: Final = "intensity"
 _OBJECT: Final[Sequence[tuple[str, str, str, Callable[[ObjectAssessment], Any]]]] = (
     ("description", "", "", lambda item: item.body.description),
     ("samples", "sampled blocks of uncertain size", "1", lambda item: item.samples),
-    ("uplift", "lowest uplift acceleration", "m/s^2", lambda item: item.uplift),
+    ("uplift", "lowest uplift acceleration", "m/s^2", lambda item: item.uplift_acceleration),
     ("friction", "static friction of the simulations; NaN: no slip", "1", lambda item: item.static_friction),
     ("slides_first", "whether it slides instead of rocking", "", lambda item: item.slides_first),
     ("fault", "why there is no curve", "", lambda item: item.fault),

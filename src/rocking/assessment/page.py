@@ -102,7 +102,7 @@ def _write_object(assessment: Assessment, k: int) -> str:
         ]
         rows.append(row + [f"{float(data[rule].values[k, m]):.2f}" for rule in rules])
     statements = "".join(f"<li>{escape(text)}</li>" for text in describe_object(assessment, k))
-    table = _write_table(header, rows, dense=True)
+    table = _write_table(header, rows, is_dense=True)
     return f"""<section id="object-{k + 1}"><h2>{k + 1}. {escape(item.name)}</h2>
 <p class="soft">{"; ".join(details)}</p>
 {_draw_fragility(assessment, item)}
@@ -172,7 +172,7 @@ def describe_object(assessment: Assessment, k: int) -> list[str]:
     notes = []
     if item.fragility is not None and item.curve is not None:
         has_ends = item.curve.is_bounded and not math.isinf(item.curve.dispersion_interval[1])
-        notes = [item.fragility.missing, item.fragility.undecided] if has_ends else [*item.fragility.notes]
+        notes = [item.fragility.missing_note, item.fragility.undecided_note] if has_ends else [*item.fragility.notes]
     texts = [*statements, *(f"{note}." for note in notes if note)]
     return [f"{text[0].upper()}{text[1:]}".replace("< ", "less than ").replace("> ", "more than ") for text in texts]
 
@@ -191,7 +191,7 @@ def _describe_rate(assessment: Assessment, item: ObjectAssessment) -> list[str]:
 
 def _describe_sliding(item: ObjectAssessment, data: xr.Dataset, k: int) -> list[str]:
     """Describe the friction that an object requires, or its slip."""
-    threshold = item.uplift / item.body.gravity
+    threshold = item.uplift_acceleration / item.body.gravity
     if item.friction is None:
         text = f"It lifts off at {threshold:.3g} g. With a coefficient of friction below {threshold:.3g} it would slide"
         return [f"{text} instead of rock; the simulations do not include sliding."]
@@ -230,7 +230,7 @@ def _write_records(assessment: Assessment) -> str:
     rows = [[escape(text) for text in row] for row in zip(*columns.values(), strict=True)]
     unused = zip(_shorten_names(assessment.skipped), assessment.skipped.values(), strict=True)
     rows += [[escape(name), *[""] * (len(columns) - 2), f"not used: {escape(why)}"] for name, why in unused]
-    table = _write_table([*columns], rows, dense=True)
+    table = _write_table([*columns], rows, is_dense=True)
     return f'<section id="records"><h2>Ground motions</h2>\n{table}</section>'
 
 
@@ -290,13 +290,13 @@ def _draw_fragility(assessment: Assessment, item: ObjectAssessment) -> str:
     return chart.write()
 
 
-def _write_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, dense: bool = False) -> str:
+def _write_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, is_dense: bool = False) -> str:
     """Write a table of HTML texts below a heading of plain texts."""
     kinds = [_choose_kind([row[k] for row in rows]) for k in range(len(header))]
     heading = "".join(f"<th{kind}>{escape(title)}</th>" for kind, title in zip(kinds, header, strict=True))
     lines = ("".join(f"<td{kind}>{cell}</td>" for kind, cell in zip(kinds, row, strict=True)) for row in rows)
     body = "".join(f"<tr>{line}</tr>\n" for line in lines)
-    style = " class=dense" if dense else ""
+    style = " class=dense" if is_dense else ""
     return f'<div class="wide"><table{style}><thead><tr>{heading}</tr></thead><tbody>\n{body}</tbody></table></div>'
 
 

@@ -100,7 +100,7 @@ class ObjectAssessment:
         return np.where(exists, bounded[first], self.levels[-1]), high
 
     @property
-    def uplift(self) -> float:
+    def uplift_acceleration(self) -> float:
         """Lowest uplift acceleration, m/s^2."""
         return min(self.body.uplift_thresholds())
 
@@ -124,7 +124,7 @@ class ObjectAssessment:
     @property
     def slides_first(self) -> bool:
         """Whether friction is so low that the object slides instead of rocking from rest."""
-        return self.static_friction * self.body.gravity <= self.uplift
+        return self.static_friction * self.body.gravity <= self.uplift_acceleration
 
     def bound_vulnerability(self, hazard: HazardCurve | None) -> tuple[float, float, float]:
         """Return the return period of overturning, or without hazard curve the median, between its bounds."""
@@ -194,7 +194,7 @@ class Assessment(Result):
 
     def summary(self) -> str:
         header, rows = self.tabulate()
-        lines = [self._headline(), "", format_table(header, rows)]
+        lines = [self._format_headline(), "", format_table(header, rows)]
         lines += [f"not assessed: {name}: {reason}" for name, reason in self.failures.items()]
         lines += [f"not used: {text}" for text in format_reasons(self.skipped)]
         return "\n".join(lines)
@@ -283,7 +283,7 @@ class Assessment(Result):
         """
         write_page(self, path, command)
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         objects, motions = format_count(len(self.objects), "object"), format_count(len(self.motions), "motion")
         text = f"{objects} under {motions}, {self.model} model"
         failed = f"; {len(self.failures)} not assessed" if self.failures else ""

@@ -1,7 +1,7 @@
 """Rocking blocks, single or as arrays, free or restrained."""
 
 from rocking.block.bodies import Blocks
-from rocking.block.body import Bodies, Body, Coordinate
+from rocking.block.body import Bodies, Body, CoordinateLabels
 from rocking.block.restrained import RestrainedBlock
 from rocking.block.restraints import Damper, Load, Restitution, Restraint, Spring, Tendon, Thrust
 from rocking.block.sides import Side, impact_restitution, one_sided_restitution
@@ -15,7 +15,7 @@ __all__ = [
     "Blocks",
     "Bodies",
     "Body",
-    "Coordinate",
+    "CoordinateLabels",
     "Damper",
     "Load",
     "Restitution",

@@ -314,52 +314,52 @@ class Blocks:
         """Return a share of p alpha on every side, rad/s, shape (n, 2)."""
         return share * self.p * self.alpha
 
-    def create_kernel_records(self, model: Model, thresholds: Floats) -> state.Records:
-        """Return records for kernels (`kernels.state.BLOCK_DTYPE`), shape (n,)."""
+    def create_kernel_structs(self, model: Model, thresholds: Floats) -> state.Structs:
+        """Return structs for kernels (`kernels.state.BLOCK_DTYPE`), shape (n,)."""
         p, alpha = self.p, self.alpha
-        records = state.create_records(len(self), state.BLOCK_DTYPE)
+        structs = state.create_structs(len(self), state.BLOCK_DTYPE)
         stiffness, cosine = p * p, np.cos(alpha)
-        records["stiffness"], records["slenderness"] = stiffness, alpha
-        records["sine"], records["cosine"] = np.sin(alpha), cosine
-        records["threshold"] = alpha if model == "linear" else np.tan(alpha)
-        records["restoring_gain"] = stiffness if model == "linear" else stiffness * cosine
-        records["restitution"] = self.restitution
-        records["rest_limit"] = thresholds
-        records["next_side"] = (1, 0)
-        records["overturn_angle"] = 0.5 * math.pi
+        structs["stiffness"], structs["slenderness"] = stiffness, alpha
+        structs["sine"], structs["cosine"] = np.sin(alpha), cosine
+        structs["threshold"] = alpha if model == "linear" else np.tan(alpha)
+        structs["restoring_gain"] = stiffness if model == "linear" else stiffness * cosine
+        structs["restitution"] = self.restitution
+        structs["rest_limit"] = thresholds
+        structs["next_side"] = (1, 0)
+        structs["overturn_angle"] = 0.5 * math.pi
         if self.terms:
-            self._add_terms(records, model)
-        return records
+            self._add_terms(structs, model)
+        return structs
 
-    def _add_terms(self, records: state.Records, model: Model) -> None:
-        """Add terms of restraints to records."""
-        terms, p, sine, cosine = self.terms, self.p, records["sine"], records["cosine"]
+    def _add_terms(self, structs: state.Structs, model: Model) -> None:
+        """Add terms of restraints to structs."""
+        terms, p, sine, cosine = self.terms, self.p, structs["sine"], structs["cosine"]
         is_one_sided = terms["one_sided"] > 0.0
-        records["next_side"][is_one_sided] = 0
-        records["threshold"][:, 1] = np.where(is_one_sided[:, 1], math.inf, records["threshold"][:, 1])
-        records["min_restitution"] = terms["min_restitution"]
-        records["restitution_slope"] = terms["restitution_slope"]
-        records["seed"] = terms["restitution_seed"][:, 0]
-        records["variable_restitution"] = (records["seed"] >= 0) | np.any(records["restitution_slope"] > 0.0, axis=1)
-        records["prestress"], records["spring"] = p * p * terms["prestress"], p * p * terms["spring"]
-        records["damping"] = terms["damping"]
+        structs["next_side"][is_one_sided] = 0
+        structs["threshold"][:, 1] = np.where(is_one_sided[:, 1], math.inf, structs["threshold"][:, 1])
+        structs["min_restitution"] = terms["min_restitution"]
+        structs["restitution_slope"] = terms["restitution_slope"]
+        structs["seed"] = terms["restitution_seed"][:, 0]
+        structs["variable_restitution"] = (structs["seed"] >= 0) | np.any(structs["restitution_slope"] > 0.0, axis=1)
+        structs["prestress"], structs["spring"] = p * p * terms["prestress"], p * p * terms["spring"]
+        structs["damping"] = terms["damping"]
         moment = terms["sine"] * sine + terms["cosine"] * cosine  # at u = 0
         slope = terms["sine"] * cosine - terms["cosine"] * sine
         # The moment of a tendon without prestress is zero here apart from rounding.
         moment[np.abs(moment) <= 1e-14 * (np.abs(terms["sine"] * sine) + np.abs(terms["cosine"] * cosine))] = 0.0
         gain = 1.0 if model == "linear" else cosine  # gain divided by p^2
-        records["restraint_threshold"] = (moment + terms["prestress"]) / gain
+        structs["restraint_threshold"] = (moment + terms["prestress"]) / gain
         if model == "linear":
-            records["added_weight"], records["added_push"] = slope, moment - self.alpha * slope
+            structs["added_weight"], structs["added_push"] = slope, moment - self.alpha * slope
         else:
-            records["added_weight"], records["added_push"] = terms["sine"], terms["cosine"]
-        records["yielding"] = np.any(terms["stiffness"] > 0.0, axis=1)
-        if np.any(records["yielding"]):  # a yielding tendon is initially elastic
+            structs["added_weight"], structs["added_push"] = terms["sine"], terms["cosine"]
+        structs["yielding"] = np.any(terms["stiffness"] > 0.0, axis=1)
+        if np.any(structs["yielding"]):  # a yielding tendon is initially elastic
             for name in ("added_weight", "added_push", "prestress", "restraint_threshold"):
-                records[f"base_{name.removeprefix('added_')}"] = records[name]
-            records["tendon_stiffness"] = p * p * terms["stiffness"]
-            records["lever_arm"] = terms["lever_arm"]
-            records["yield_elongation"], records["slack_elongation"] = (
+                structs[f"base_{name.removeprefix('added_')}"] = structs[name]
+            structs["tendon_stiffness"] = p * p * terms["stiffness"]
+            structs["lever_arm"] = terms["lever_arm"]
+            structs["yield_elongation"], structs["slack_elongation"] = (
                 terms["yield_elongation"][:, 0],
                 terms["slack_elongation"][:, 0],
             )
@@ -367,15 +367,15 @@ class Blocks:
                 terms["stiffness"] * terms["lever_arm"],
                 -terms["stiffness"] * terms["slack_elongation"],
             )
-            records["tendon_weight"] = -tendon_moment * (1.0 if model == "linear" else cosine)
-            records["tendon_push"] = tendon_moment * (self.alpha if model == "linear" else sine)
-            records["added_weight"] += records["tendon_weight"]
-            records["added_push"] += records["tendon_push"]
-            records["prestress"] += p * p * slack_moment
-            records["restraint_threshold"] += slack_moment / gain
+            structs["tendon_weight"] = -tendon_moment * (1.0 if model == "linear" else cosine)
+            structs["tendon_push"] = tendon_moment * (self.alpha if model == "linear" else sine)
+            structs["added_weight"] += structs["tendon_weight"]
+            structs["added_push"] += structs["tendon_push"]
+            structs["prestress"] += p * p * slack_moment
+            structs["restraint_threshold"] += slack_moment / gain
         names = ("restraint_threshold", "added_weight", "added_push", "prestress", "spring", "damping")
-        is_restrained = [np.any(records[name] != 0.0, axis=1) for name in (*names, "tendon_stiffness")]
-        records["restrained"] = np.any(is_restrained, axis=0)
+        is_restrained = [np.any(structs[name] != 0.0, axis=1) for name in (*names, "tendon_stiffness")]
+        structs["restrained"] = np.any(is_restrained, axis=0)
 
     @property
     def stops(self) -> Floats:

@@ -12,10 +12,10 @@ from typing import Any, Final, NamedTuple, Protocol, Self, runtime_checkable
 
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import Model
-from rocking.kernels.state import Records
+from rocking.kernels.state import Structs
 
 
-class Coordinate(NamedTuple):
+class CoordinateLabels(NamedTuple):
     """Names of the coordinate of a body in texts, columns and figures.
 
     Attributes
@@ -79,7 +79,7 @@ class Body(Protocol):
         """Acceleration of gravity, m/s^2."""
 
     @property
-    def coordinate(self) -> Coordinate:
+    def coordinate(self) -> CoordinateLabels:
         """Names and unit of the coordinate."""
 
     @property
@@ -161,8 +161,8 @@ class Bodies(Protocol):
     def speed_thresholds(self, share: float) -> Floats:
         """Return a share of the characteristic speed of each side, shape (n, 2): p alpha for a block, rad/s."""
 
-    def create_kernel_records(self, model: Model, thresholds: Floats) -> Records:
-        """Return records for kernels (`kernels.state.BLOCK_DTYPE`); ``thresholds`` of a scheme have shape (n, 2)."""
+    def create_kernel_structs(self, model: Model, thresholds: Floats) -> Structs:
+        """Return structs for kernels (`kernels.state.BLOCK_DTYPE`); ``thresholds`` of a scheme have shape (n, 2)."""
 
 
 class BodiesFactory(Protocol):

@@ -15,7 +15,7 @@ from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
 from rocking.errors import OptionError
-from rocking.kernels.state import Records
+from rocking.kernels.state import Structs
 
 #: Coefficient of friction, or the pair (static, kinetic).
 Friction = float | Sequence[float]
@@ -52,8 +52,8 @@ def resolve_friction(friction: Friction | None) -> tuple[float, float] | None:
     return None if math.isinf(static) and math.isinf(kinetic) else (static, kinetic)
 
 
-def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple[float, float]) -> None:
-    """Add friction and sizes to records for kernels.
+def add_friction(structs: Structs, bodies: Bodies, model: Model, friction: tuple[float, float]) -> None:
+    """Add friction and sizes to structs for kernels.
 
     Raises
     ------
@@ -100,20 +100,20 @@ def add_friction(records: Records, bodies: Bodies, model: Model, friction: tuple
         gain > _SIZE_TOLERANCE * pivot_square**2,
         "this restitution would gain energy in a slip, so that {} requires another one; omit the restitution",
     )
-    records["has_friction"], records["static_friction"], records["kinetic_friction"] = True, static, kinetic
-    records["arm"], records["pivot_distance"], records["height"] = arm / g, base / g, height[:, 0] / g
-    records["inertia_ratio"] = ratio / (1.0 - ratio)
-    s, c = (bodies.alpha, 1.0) if is_linear else (records["sine"], records["cosine"])
+    structs["has_friction"], structs["static_friction"], structs["kinetic_friction"] = True, static, kinetic
+    structs["arm"], structs["pivot_distance"], structs["height"] = arm / g, base / g, height[:, 0] / g
+    structs["inertia_ratio"] = ratio / (1.0 - ratio)
+    s, c = (bodies.alpha, 1.0) if is_linear else (structs["sine"], structs["cosine"])
     lost = 0.0 if is_linear else ratio * s
     per_push = 1.0 - ratio * c * c + static * lost
-    records["sticking_push"] = (1.0 - _SIZE_TOLERANCE) * (static * (1.0 - lost * s) - ratio * s) / per_push
-    records["sticking_slope"] = 0.0 if is_linear else arm / g * (s + static) / per_push
+    structs["sticking_push"] = (1.0 - _SIZE_TOLERANCE) * (static * (1.0 - lost * s) - ratio * s) / per_push
+    structs["sticking_slope"] = 0.0 if is_linear else arm / g * (s + static) / per_push
 
 
 def check_friction(bodies: Bodies, model: Model, friction: tuple[float, float] | None) -> None:
     """Raise `OptionError` if bodies cannot be simulated with friction; see `add_friction`."""
     if friction is not None:
-        add_friction(bodies.create_kernel_records(model, np.zeros((len(bodies), 2))), bodies, model, friction)
+        add_friction(bodies.create_kernel_structs(model, np.zeros((len(bodies), 2))), bodies, model, friction)
 
 
 def _raise_if_any(is_invalid: Flags, text: str) -> None:

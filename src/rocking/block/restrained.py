@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from rocking.block.body import SINGLE_BODY_TYPES, ContactLaw, Coordinate
+from rocking.block.body import SINGLE_BODY_TYPES, ContactLaw, CoordinateLabels
 from rocking.block.restraints import Load, Pivot, Pivots, Restitution, Restraint, RestraintTerms, Tendon
 from rocking.block.sides import Side, check_pair, check_parameter, one_sided_restitution
 from rocking.block.single import Block, BlockBase, require_block
@@ -24,7 +24,7 @@ from rocking.errors import BlockError, OptionError
 _N_SAMPLES: Final = 512
 
 _RESTRAINT_NAMES: Final = "Tendon, Spring, Damper, Thrust or Load"
-_ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "balance")
+_ROTATION: Final = CoordinateLabels("rotation", "angular_velocity", "angular_acceleration", "rad", "balance")
 
 
 @dataclass(frozen=True, repr=False)
@@ -74,7 +74,7 @@ class RestrainedBlock(BlockBase):
     [2.1613, 2.1613]
     """
 
-    coordinate: ClassVar[Coordinate] = _ROTATION
+    coordinate: ClassVar[CoordinateLabels] = _ROTATION
 
     block: Block
     _terms: tuple[RestraintTerms, RestraintTerms]
@@ -172,8 +172,8 @@ class RestrainedBlock(BlockBase):
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
         """Return the ground accelerations, m/s^2, that lift the block to side + (if -a exceeds it) and to side -."""
         checks.choice(model, "model", OptionError, MODELS)
-        records = self.as_bodies().create_kernel_records(model, np.zeros((1, 2)))
-        plus, minus = (self.gravity * (records["threshold"] + records["restraint_threshold"])[0]).tolist()
+        structs = self.as_bodies().create_kernel_structs(model, np.zeros((1, 2)))
+        plus, minus = (self.gravity * (structs["threshold"] + structs["restraint_threshold"])[0]).tolist()
         return plus, minus
 
     @property

@@ -10,7 +10,7 @@ from typing import Any, Final, Never, Self
 
 import numpy as np
 
-from rocking.block.body import BODIES_TYPES, SINGLE_BODY_TYPES, Bodies, Body, Coordinate
+from rocking.block.body import BODIES_TYPES, SINGLE_BODY_TYPES, Bodies, Body, CoordinateLabels
 from rocking.block.sides import (
     Side,
     check_gravity,
@@ -33,7 +33,7 @@ from rocking.core.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import BlockError, OptionError, UnequalSidesError
 
 #: The coordinate of every block.
-ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
+ROTATION: Final = CoordinateLabels("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
 
 #: Relative rounding error of a length.
 _LENGTH_ROUNDING: Final = 1e-12
@@ -484,7 +484,7 @@ class Block(BlockBase):
         return float(plus)
 
     @property
-    def coordinate(self) -> Coordinate:
+    def coordinate(self) -> CoordinateLabels:
         """Names and unit of the coordinate, the rotation."""
         return ROTATION
 

@@ -120,11 +120,11 @@ class Diagnostics:
 
     Attributes
     ----------
-    candidates : int
+    candidate_count : int
         Number of blocks simulated under every motion.
-    effective : float
+    effective_count : float
         Effective number of candidates that represent a typical population of the posterior.
-    agreement : mapping of str to float
+    r_hat : mapping of str to float
         R-hat of each estimate between independent runs: 1 if they agree, above 1.1 if they disagree.
     bounds_reached : tuple of BoundReached
         Estimates whose interval ends at a bound.
@@ -137,32 +137,32 @@ class Diagnostics:
     Examples
     --------
     >>> from rocking.calibration import Diagnostics
-    >>> Diagnostics(candidates=256, effective=12.0, agreement={"alpha": 1.02}, bounds_reached=()).notes
+    >>> Diagnostics(candidate_count=256, effective_count=12.0, r_hat={"alpha": 1.02}, bounds_reached=()).notes
     ('only 12 candidates represent a typical population: double the candidates, or narrow the bounds',)
     """
 
-    candidates: int
-    effective: float
-    agreement: Mapping[str, float]
+    candidate_count: int
+    effective_count: float
+    r_hat: Mapping[str, float]
     bounds_reached: tuple[BoundReached, ...]
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Warnings about the estimates, one sentence each."""
         notes, correction = [*map(str, self.bounds_reached)], "double the candidates, or narrow the bounds"
-        disagreeing = ", ".join(f"{name} ({value:.2f})" for name, value in self.agreement.items() if value > MAX_R_HAT)
+        disagreeing = ", ".join(f"{name} ({value:.2f})" for name, value in self.r_hat.items() if value > MAX_R_HAT)
         if disagreeing:
             disagreement = f"independent runs disagree (R-hat) on {disagreeing}"
             notes.append(f"{disagreement}: the estimates average them; {correction}")
-        if self.effective < 20.0:
-            shortage = f"only {format_count(round(self.effective), 'candidate')} represent a typical population"
+        if self.effective_count < 20.0:
+            shortage = f"only {format_count(round(self.effective_count), 'candidate')} represent a typical population"
             notes.append(f"{shortage}: {correction}")
         return tuple(notes)
 
     def __str__(self) -> str:
-        candidates = format_count(self.candidates, "candidate")
-        effective = f"{self.effective:.0f} effective for a typical population"
-        runs = f"{RUN_COUNT} independent runs, R-hat at most {max(self.agreement.values()):.2f}"
+        candidates = format_count(self.candidate_count, "candidate")
+        effective = f"{self.effective_count:.0f} effective for a typical population"
+        runs = f"{RUN_COUNT} independent runs, R-hat at most {max(self.r_hat.values()):.2f}"
         return "\n".join([f"{candidates}, {effective}; {runs}", *(f"note: {sentence}" for sentence in self.notes)])
 
 
@@ -170,7 +170,7 @@ def diagnose(search: SearchResult, populations: Floats) -> Diagnostics:
     """Compute the diagnostics of a search from the draws of its posterior."""
     candidates, effective = search.evidence.candidates, float(np.median(search.evidence.count_effective(populations)))
     bounds_reached = list_bounds_reached(candidates.space, split_populations(populations)[0])
-    return Diagnostics(len(candidates.points), effective, search.agreement, bounds_reached)
+    return Diagnostics(len(candidates.points), effective, search.r_hat, bounds_reached)
 
 
 def list_bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ...]:

@@ -173,7 +173,7 @@ class HistoryCalibration(Result):
         numbers = ((name, f"{fit.value:.4g} {find_parameter_unit(name)}") for name, fit in self.estimates.items())
         return ", ".join(f"{name.replace('_', ' ')} = {number.removesuffix(' 1')}" for name, number in numbers)
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         return f"{self._format_estimates()}; {self._format_misfit()}"
 
     def _format_misfit(self) -> str:

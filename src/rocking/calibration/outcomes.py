@@ -183,7 +183,9 @@ class Calibration(Result):
         if isinstance(motions, Sized) and not isinstance(motions, Motion) and not len(motions):
             return np.empty(0)
         overturned = simulate_outcomes(self.blocks, motions, self.model)
-        return compute_probabilities(self.weights @ overturned, self.diagnostics.effective, self.outlier_probability)
+        return compute_probabilities(
+            self.weights @ overturned, self.diagnostics.effective_count, self.outlier_probability
+        )
 
     def cross_validate(
         self, *, groups: Sequence[object] | None = None, folds: int = 10, repeats: int = 1, seed: int = 0
@@ -239,7 +241,7 @@ class Calibration(Result):
         """
         return rocking_spectrum(self.blocks, motions, weights=self.weights, model=model or self.model, **options)
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         overturned = int(self.observed.sum())
         return f"{format_count(len(self.observed), 'motion')}, {overturned} overturned the specimen; {self.model} model"
 
@@ -251,7 +253,7 @@ class Calibration(Result):
         size = 1.0 / float((self.weights**2).sum())
         table = format_table(["parameter", "median", "5 %", "95 %", "dispersion", "unit"], rows)
         ensemble = f"ensemble of {format_count(len(self.blocks), 'block')}, equivalent to {size:.0f} of equal weight"
-        return f"{self._headline()}\n\n{table}\n\n{ensemble}\nfitted motions: {self.scores}\n{self.diagnostics}"
+        return f"{self._format_headline()}\n\n{table}\n\n{ensemble}\nfitted motions: {self.scores}\n{self.diagnostics}"
 
     def to_dict(self) -> dict[str, Any]:
         bounds_reached = [asdict(entry) for entry in self.diagnostics.bounds_reached]
@@ -282,7 +284,7 @@ class Calibration(Result):
             overturned=self.observed,
             parameters=[self._create_parameter(name) for name in self._evidence.candidates.space.unknown],
             weights=self.weights,
-            title=title or escape_dollars(self._headline()),
+            title=title or escape_dollars(self._format_headline()),
             ax=ax,
             figsize=figsize,
         )
@@ -299,7 +301,7 @@ class Calibration(Result):
         return Parameter({"p": "p (rad/s)", "alpha": "alpha (rad)"}.get(name, name), values, ends, (low, high))
 
     def __repr__(self) -> str:
-        return f"<Calibration: {self._headline()}; fitted: {self.scores}>"
+        return f"<Calibration: {self._format_headline()}; fitted: {self.scores}>"
 
 
 def simulate_outcomes(blocks: Bodies, motions: Motions, model: Model) -> NDArray[np.float32]:

@@ -261,12 +261,12 @@ class SearchResult:
     posteriors: tuple[Floats, ...]
 
     @property
-    def effective_candidates(self) -> float:
+    def effective_count(self) -> float:
         """Effective number of candidates that represent a typical population."""
         return float(np.median(self.evidence.count_effective(np.vstack(self.posteriors))))
 
     @property
-    def agreement(self) -> dict[str, float]:
+    def r_hat(self) -> dict[str, float]:
         """R-hat between the runs of each parameter's centre, by name."""
         space = self.evidence.candidates.space
         centres = [space.parameters_by_name(split_populations(populations)[0]) for populations in self.posteriors]
@@ -280,9 +280,9 @@ def search(problem: Problem, candidates: int, rng: Generator) -> SearchResult:
     runs: Sequence[Candidates] = [problem.fill_space(_FILLING_PARTS * part_size, stream) for stream in streams]
     result = _extend_runs(problem, runs, _ANNEALING_EXPONENTS, part_size, streams)
     for _ in range(_MAX_EXTENSIONS):
-        if max(result.agreement.values()) >= MAX_R_HAT:
+        if max(result.r_hat.values()) >= MAX_R_HAT:
             exponents = 0.1, 0.3, 1.0
-        elif result.effective_candidates < 100.0:  # few blocks overrate a population that one of them fits by chance
+        elif result.effective_count < 100.0:  # few blocks overrate a population that one of them fits by chance
             exponents = 1.0, 1.0, 1.0
         else:
             break

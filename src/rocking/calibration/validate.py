@@ -126,7 +126,7 @@ class MeanScore:
     skill, skill_error : float
         1 minus the ratio of the score to the base rate's score on the same tests, and its standard error. The skill is
         1 for perfect predictions, 0 for the base rate, and NaN if the base rate is perfect.
-    tests, clusters : int
+    test_count, cluster_count : int
         Number of tests, and of clusters of tests that belong together.
 
     See Also
@@ -140,7 +140,7 @@ class MeanScore:
     >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (1.0, 2.0, 3.0, 4.0)]
     >>> tests = [rocking.ShakeTest(pulse, a) for pulse, a in zip(pulses, (False, False, True, True))]
     >>> result = rocking.validate(tests, rocking.Block.from_parameters(3.0, 0.15, 0.9))
-    >>> result.brier.value, result.brier.tests
+    >>> result.brier.value, result.brier.test_count
     (0.25, 4)
     """
 
@@ -148,8 +148,8 @@ class MeanScore:
     error: float
     skill: float
     skill_error: float
-    tests: int
-    clusters: int
+    test_count: int
+    cluster_count: int
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ class ReliabilityBin:
     ----------
     lower, upper : float
         Ends of the bin.
-    tests : int
+    test_count : int
         Number of tests in the bin.
     predicted, observed : float
         Predicted and observed shares that overturn.
@@ -178,13 +178,13 @@ class ReliabilityBin:
     >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (1.0, 2.0, 3.0, 4.0)]
     >>> tests = [rocking.ShakeTest(pulse, a) for pulse, a in zip(pulses, (False, False, True, True))]
     >>> result = rocking.validate(tests, rocking.Block.from_parameters(3.0, 0.15, 0.9))
-    >>> [(share.tests, round(share.observed, 2)) for share in result.reliability]
+    >>> [(share.test_count, round(share.observed, 2)) for share in result.reliability]
     [(1, 0.0), (3, 0.67)]
     """
 
     lower: float
     upper: float
-    tests: int
+    test_count: int
     predicted: float
     observed: float
     band_lower: float
@@ -248,15 +248,15 @@ class ModelValidation(Result):
         if overturned_count in (0, len(self.tests)):
             tests = "all tests" if overturned_count else "no test"
             notes.append(f"{tests} overturned the specimen: the base rate is perfect, so that the skill is undefined")
-        if self.brier.clusters < 10:
-            cluster_text = format_count(self.brier.clusters, "cluster")
+        if self.brier.cluster_count < 10:
+            cluster_text = format_count(self.brier.cluster_count, "cluster")
             notes.append(f"the tests belong to {cluster_text} only: standard errors are rough")
         if math.isinf(self.log_loss.value):
             reason = "because a certain prediction failed"
             notes.append(f"the log loss is infinite {reason}: include the uncertainty of the specimen")
         return tuple(notes)
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         overturned_count = sum(test.overturned for test in self.tests)
         model_text = f", {self.model} model" if self.model else ""
         return f"{self.description}{model_text}: {format_count(len(self.tests), 'test')}, {overturned_count} overturned"
@@ -270,7 +270,7 @@ class ModelValidation(Result):
         reliability = f"{negation}as if the predictions were right (p = {self.reliability_chance:.2g})"
         table = format_table(["score", "mean", "+-", "skill", "+-"], scores)
         notes = (f"note: {sentence}" for sentence in self.notes)
-        return "\n".join([self._headline(), "", table, "", f"reliability: {reliability}", *notes])
+        return "\n".join([self._format_headline(), "", table, "", f"reliability: {reliability}", *notes])
 
     def to_dict(self) -> dict[str, Any]:
         return asdict(self) | {"notes": [*self.notes]}
@@ -284,7 +284,7 @@ class ModelValidation(Result):
         columns = ("predicted", "observed", "band_lower", "band_upper")
         return draw_reliability(
             **{name: np.array([getattr(row, name) for row in self.reliability]) for name in columns},
-            title=title or escape_dollars(self._headline()),
+            title=title or escape_dollars(self._format_headline()),
             ax=ax,
             figsize=figsize,
         )
@@ -383,7 +383,7 @@ def validate(
                 raise OptionError("a calibration contains its own {}: omit the argument", "weights")
             description, equation = f"calibration, {format_count(len(blocks.blocks), 'block')}", model or blocks.model
             bodies: Bodies = blocks.blocks
-            shares, effective = blocks.weights / blocks.weights.sum(), blocks.diagnostics.effective
+            shares, effective = blocks.weights / blocks.weights.sum(), blocks.diagnostics.effective_count
             outlier_probability = blocks.outlier_probability if outlier_probability is None else outlier_probability
         else:
             description, equation = describe_pool(blocks, weights), model or "nonlinear"

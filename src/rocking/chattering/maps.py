@@ -371,7 +371,7 @@ class ChatteringEpisodes(Result):
     shaking_span: tuple[float, float]
     time_at_rest: float
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         return f"{len(self.episodes)}, at rest for {self.time_at_rest:.3f} s of the shaking"
 
     @property

@@ -64,7 +64,7 @@ class ChatteringReport(Result):
     cycles: NDArray[np.void] | None
     p: float | None
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         case = ", ".join(f"{name} = {self.values[name]:g}" for name in ("a", "omega", "eta"))
         return f"{case}: {self._describe_completeness()}"
 
@@ -241,7 +241,7 @@ class CriticalReport(Result):
     eta: float
     amplitudes: dict[str, float | None]
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         exact = self.amplitudes["exact"]
         return f"omega = {self.omega:g}, eta = {self.eta:g}: chattering is complete up to {exact:.9g} g alpha"
 

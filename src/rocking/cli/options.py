@@ -359,9 +359,11 @@ class _RecordOptions(FileOptions):
         if not (records or pulses or stochastic):
             message = "at least one record is required: file, folder, or name of a shipped record, or {} or {}"
             raise OptionError(message, "pulse", "stochastic")
-        names_channels = "channel" in self.supplied_texts() or self.supplied_texts().get("vertical", OWN) != OWN
-        if self.component != "own" or (with_pairs and records and not names_channels and STANDARD_INPUT not in records):
-            return self._load_pairs(records, [*pulses, *stochastic], names_channels=names_channels)
+        has_channel_names = "channel" in self.supplied_texts() or self.supplied_texts().get("vertical", OWN) != OWN
+        if self.component != "own" or (
+            with_pairs and records and not has_channel_names and STANDARD_INPUT not in records
+        ):
+            return self._load_pairs(records, [*pulses, *stochastic], has_channel_names=has_channel_names)
         pulse_motions = self.create_pulses()
         read = functools.partial(self.read_motion, several=len(records) > 1)
         motions, skipped = read_records(records, read, keep_going=self.keep_going)
@@ -374,10 +376,10 @@ class _RecordOptions(FileOptions):
         is_single = [*motions] == [*names, *pulses] and len(motions) == 1 and not self.reversed
         return LoadedRecords(self._add_reversed(motions), skipped, is_single)
 
-    def _load_pairs(self, records: Sequence[str], others: Sequence[str], *, names_channels: bool) -> LoadedRecords:
+    def _load_pairs(self, records: Sequence[str], others: Sequence[str], *, has_channel_names: bool) -> LoadedRecords:
         """Return both horizontal components of each station, scaled by one factor unless each has its own measure."""
         is_own = self.component == "own"
-        if not is_own and (others or names_channels):
+        if not is_own and (others or has_channel_names):
             message = f"{{}} {self.component} requires records: omit {{}}, {{}} and {{}}, and use {{}} {OWN} or omit it"
             raise OptionError(message, "component", "pulse", "stochastic", "channel", "vertical")
         target = self._read_target()

@@ -174,16 +174,16 @@ class Result(ABC):
         """
         raise OptionError(f"a {type(self).__name__} has no figure; use summary or to_dict")
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         """Return the result in one line, for the representation."""
         return self.summary().splitlines()[0]
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self._headline()}>"
+        return f"<{type(self).__name__}: {self._format_headline()}>"
 
     def _repr_html_(self) -> str:
         table = self.to_dataframe().to_html(max_rows=_MAX_ROWS, index=False) if self.TABLES else ""
-        return f"<p><b>{type(self).__name__}</b>: {escape(self._headline())}</p>{table}"
+        return f"<p><b>{type(self).__name__}</b>: {escape(self._format_headline())}</p>{table}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -270,11 +270,11 @@ class DatasetResult(Result):
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{size} {name}" for name, size in self.data.sizes.items())
-        return f"<{type(self).__name__}: {self._headline()} ({sizes})>"
+        return f"<{type(self).__name__}: {self._format_headline()} ({sizes})>"
 
     def _repr_html_(self) -> str:
         html: str = self.data._repr_html_()
-        return f"<p><b>{type(self).__name__}</b>: {escape(self._headline())}</p>{html}"
+        return f"<p><b>{type(self).__name__}</b>: {escape(self._format_headline())}</p>{html}"
 
 
 def create_variable(dims: str | tuple[str, ...], values: Any, meaning: str = "", unit: str = "") -> tuple[Any, ...]:

@@ -18,7 +18,7 @@ from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.orbits import compute_moduli, compute_multipliers
 from rocking.errors import OptionError
 from rocking.kernels.periodic import TRAP_COLUMNS
-from rocking.kernels.state import Records
+from rocking.kernels.state import Structs
 
 #: Longest period of an attractor, in periods of the motion.
 MAX_PERIOD: Final = 64
@@ -41,14 +41,14 @@ class Attractor:
         Coordinate and velocity at the starts of the periods of the motion.
     multipliers : ndarray of complex, shape (2,)
         Eigenvalues of the derivative of the map over the period of the orbit; zero if the orbit contains a rest.
-    impacts, rests : int, bool
+    impact_count, has_rest : int, bool
         Number of resolved impacts in one period, and whether the body comes to rest.
     """
 
     states: Floats
     multipliers: NDArray[np.complex128]
-    impacts: int
-    rests: bool
+    impact_count: int
+    has_rest: bool
 
     @property
     def period(self) -> int:
@@ -58,9 +58,9 @@ class Attractor:
     @property
     def name(self) -> str:
         """Description in words."""
-        if self.impacts == 0 and np.all(self.states[:, 1] == 0.0):
+        if self.impact_count == 0 and np.all(self.states[:, 1] == 0.0):
             return "rest"
-        return f"period {self.period}, {'rest' if self.rests else format_count(self.impacts, 'impact')}"
+        return f"period {self.period}, {'rest' if self.has_rest else format_count(self.impact_count, 'impact')}"
 
 
 def find_attractor(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attractor | None:
@@ -104,10 +104,10 @@ def _find_fixed_point(strobe: StroboscopicMap, point: Floats, period: int, size:
 
 
 def _create_trap(
-    strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: Records, size: Floats
+    strobe: StroboscopicMap, attractor: Attractor, point: Floats, struct: Structs, size: Floats
 ) -> Floats | None:
     """Find an invariant neighbourhood of a point of an attractor, as a row for `kernels.periodic.iterate_periods`."""
-    side, u, v = int(record["side"]), float(record["u"]), float(record["v"])
+    side, u, v = int(struct["side"]), float(struct["u"]), float(struct["v"])
     if side < 0:  # at rest, whatever the previous state
         return np.array([side, 0.0, 0.0, 0.0, 0.0, 0.0])
     _, derivative = strobe.derivative(point, attractor.period)
@@ -118,18 +118,18 @@ def _create_trap(
     def is_trapping(offsets: Floats) -> bool:
         """Whether states around the point approach it, on the same side and with the same number of impacts."""
         in_front = offsets[u + offsets[:, 0] > 0.0]
-        if np.any(u + offsets[:, 0] >= strobe._body_records["overturn_angle"][0]) or len(in_front) == 0:
+        if np.any(u + offsets[:, 0] >= strobe._body_structs["overturn_angle"][0]) or len(in_front) == 0:
             return False
         samples = strobe._to_coordinates(u + in_front[:, 0], v + in_front[:, 1], np.full(len(in_front), side))
         images, derivatives = strobe.derivative(samples, attractor.period)
-        if not np.isfinite(derivatives).all() or np.any(strobe._to_records(images)[1]["side"] != side):
+        if not np.isfinite(derivatives).all() or np.any(strobe._to_structs(images)[1]["side"] != side):
             return False
-        if attractor.rests:
+        if attractor.has_rest:
             target = strobe._to_coordinates(np.array([u]), np.array([v]), np.array([side]))[0]
             return bool(not derivatives.any() and np.abs((images - target) / size).max() < 1e-9)
         _, _, impacts = strobe.advance(samples, attractor.period)
         norms = np.linalg.norm(norm_matrix @ derivatives @ np.linalg.inv(norm_matrix), ord=2, axis=(1, 2))
-        return bool(np.all(impacts == attractor.impacts) and np.all(norms <= 0.5 * (1.0 + rate)))
+        return bool(np.all(impacts == attractor.impact_count) and np.all(norms <= 0.5 * (1.0 + rate)))
 
     angles = 2.0 * np.pi * np.arange(_ANGLE_COUNT) / _ANGLE_COUNT
     rings = np.arange(1, _RING_COUNT + 1)[:, None, None] / _RING_COUNT
@@ -189,14 +189,14 @@ class KnownAttractors:
 
     def classify_or_search(self, states: Floats) -> Integers:
         """Return the attractor of each state, -1 for a state outside all traps, and search for new attractors."""
-        _, records = self.strobe._to_records(states)
-        indices = self.classify(records)
+        _, structs = self.strobe._to_structs(states)
+        indices = self.classify(structs)
         tries_left = self.MAX_TRIES
         while tries_left and (unsettled := np.flatnonzero(indices == -1)).size:
             first, new_index = unsettled[0], len(self.attractors)
             index = self._add_attractor(find_attractor(self.strobe, states[first], self.size))
             if index == new_index:
-                traps = self.advance_to_traps(records[unsettled], self.attractors[index].period)[0]
+                traps = self.advance_to_traps(structs[unsettled], self.attractors[index].period)[0]
                 indices[unsettled] = np.append(self.attractor_of_trap, -1)[traps]
             if index < 0 or index == new_index:  # known attractors do not count as tries
                 tries_left -= 1
@@ -204,17 +204,17 @@ class KnownAttractors:
         indices[indices == -2] = -1
         return indices
 
-    def advance_to_traps(self, records: Records, max_periods: int) -> tuple[Integers, Integers]:
+    def advance_to_traps(self, structs: Structs, max_periods: int) -> tuple[Integers, Integers]:
         """Advance states until they reach a trap; return the trap (or -1) and the number of periods of each state."""
-        return self.strobe._iterate(records, max_periods, traps=self.traps)
+        return self.strobe._iterate(structs, max_periods, traps=self.traps)
 
-    def classify(self, records: Records) -> Integers:
+    def classify(self, structs: Structs) -> Integers:
         """Return the attractor of each state, -1 for a state outside all traps."""
-        indices = np.full(len(records), -1)
+        indices = np.full(len(structs), -1)
         for trap, index in zip(self.traps, self.attractor_of_trap, strict=True):
-            du, dv = records["u"] - trap[1], records["v"] - trap[2]
+            du, dv = structs["u"] - trap[1], structs["v"] - trap[2]
             inside: Flags = trap[3] * du * du + 2.0 * trap[4] * du * dv + trap[5] * dv * dv <= 1.0
-            indices[(records["side"] == trap[0]) & inside & (indices == -1)] = index
+            indices[(structs["side"] == trap[0]) & inside & (indices == -1)] = index
         return indices
 
     def _add_attractor(self, attractor: Attractor | None) -> int:
@@ -228,7 +228,7 @@ class KnownAttractors:
                     return index
         # Some points of a long orbit have a neighbourhood.
         points = attractor.states[select_evenly(attractor.period, 8)]
-        pairs = zip(points, self.strobe._to_records(points)[1], strict=True)
+        pairs = zip(points, self.strobe._to_structs(points)[1], strict=True)
         traps = [row for pair in pairs if (row := _create_trap(self.strobe, attractor, *pair, self.size)) is not None]
         if not traps:
             return -1

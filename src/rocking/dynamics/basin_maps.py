@@ -47,9 +47,9 @@ class Basins(DatasetResult):
     data : xarray.Dataset
         With dimensions (velocity, coordinate): outcome, the number of the attractor, and periods until it was known.
         With dimension (attractor): share of the cells (the basin stability) with its standard_error, as of an equal
-        number of random states; period and impacts of the orbit (0 and -1 without an orbit); rests; multiplier, the
-        largest in absolute value. With dimensions (attractor, phase): orbit_coordinate and orbit_velocity. Overturning
-        and unsettled states count as attractors.
+        number of random states; period and impact_count of the orbit (0 and -1 without an orbit); has_rest; multiplier,
+        the largest in absolute value. With dimensions (attractor, phase): orbit_coordinate and orbit_velocity.
+        Overturning and unsettled states count as attractors.
 
     See Also
     --------
@@ -65,7 +65,7 @@ class Basins(DatasetResult):
     """
 
     TABLES: ClassVar = {
-        "attractors": ("share", "standard_error", "period", "impacts", "rests", "multiplier"),
+        "attractors": ("share", "standard_error", "period", "impact_count", "has_rest", "multiplier"),
         "outcomes": ("outcome", "periods"),
         "orbits": ("orbit_coordinate", "orbit_velocity"),
     }
@@ -124,7 +124,7 @@ def basins(
     motion: Motion,
     positions: ArrayLike,
     velocities: ArrayLike,
-    n_periods: int = 200,
+    period_count: int = 200,
     *,
     model: Model | None = None,
     chattering: str | ChatteringScheme = "certified",
@@ -139,7 +139,7 @@ def basins(
         Increasing rotations of a block (rad) or positions of other bodies (m) at the start of a period.
     velocities : array_like, shape (m,)
         Increasing velocities, rad/s or m/s.
-    n_periods : int
+    period_count : int
         Maximum number of periods per state.
     model, chattering : str, optional
         As in `stroboscopic_map`.
@@ -183,7 +183,7 @@ def basins(
     check_magnitudes(x, "positions")
     check_magnitudes(v, "velocities")
     checks.check_grid_size({"positions": len(x), "velocities": len(v)}, OptionError)
-    max_periods = checks.integer(n_periods, "n_periods", OptionError, minimum=1)
+    max_periods = checks.integer(period_count, "period_count", OptionError, minimum=1)
     grid = _BasinGrid(strobe, x, v, max_periods)
     grid.follow_all()
     return Basins(grid.to_dataset())
@@ -202,7 +202,7 @@ class _BasinGrid:
         self.period_counts = np.zeros(len(self.states), dtype=np.int32)
         self.known_attractors = KnownAttractors(strobe, size)
         # Raise an error for a start behind a stop, or moving into it.
-        strobe._to_records(self.states[[0, -1]], "positions", "velocities")
+        strobe._to_structs(self.states[[0, -1]], "positions", "velocities")
 
     def follow_all(self) -> None:
         """Follow all cells in random order."""
@@ -217,14 +217,14 @@ class _BasinGrid:
     def _follow_cells(self, cells: Integers) -> None:
         """Determine the outcomes of some cells."""
         strobe = self.strobe
-        _, records = strobe._to_records(self.states[cells])
-        traps, period_counts = self.known_attractors.advance_to_traps(records, self.max_periods)
+        _, structs = strobe._to_structs(self.states[cells])
+        traps, period_counts = self.known_attractors.advance_to_traps(structs, self.max_periods)
         outcome = np.append(_FIRST_ATTRACTOR + self.known_attractors.attractor_of_trap, _UNSETTLED)[traps]
-        overturned = records["ending"] == PeriodOutcome.OVERTURNED
-        outcome[overturned] = np.where(records["side"][overturned] > 0, _OVERTURNS_MINUS, _OVERTURNS_PLUS)
-        unsettled = np.flatnonzero((traps < 0) & ~overturned & (records["ending"] != PeriodOutcome.UNFINISHED))
+        overturned = structs["status"] == PeriodOutcome.OVERTURNED
+        outcome[overturned] = np.where(structs["side"][overturned] > 0, _OVERTURNS_MINUS, _OVERTURNS_PLUS)
+        unsettled = np.flatnonzero((traps < 0) & ~overturned & (structs["status"] != PeriodOutcome.UNFINISHED))
         attractors = self.known_attractors.classify_or_search(
-            strobe._to_coordinates(records["u"][unsettled], records["v"][unsettled], records["side"][unsettled])
+            strobe._to_coordinates(structs["u"][unsettled], structs["v"][unsettled], structs["side"][unsettled])
         )
         outcome[unsettled] = np.where(attractors >= 0, _FIRST_ATTRACTOR + attractors, _UNSETTLED)
         self.period_counts[cells], self.outcome[cells] = period_counts, outcome
@@ -244,8 +244,8 @@ class _BasinGrid:
         others = codes[len(reached) :].tolist()
         names = [*(known.name for known in reached), *(_OUTCOME_NAMES[code] for code in others)]
         period = [known.period for known in reached] + [0] * len(others)
-        impacts = [known.impacts for known in reached] + [-1] * len(others)
-        rests = [known.rests for known in reached] + [False] * len(others)
+        impacts = [known.impact_count for known in reached] + [-1] * len(others)
+        rests = [known.has_rest for known in reached] + [False] * len(others)
         multiplier = [float(np.abs(known.multipliers).max()) for known in reached] + [np.nan] * len(others)
         points = np.full((len(codes), max(1, *period), 2), np.nan)
         for k, known in enumerate(reached):
@@ -262,8 +262,8 @@ class _BasinGrid:
                 "share": create_variable("attractor", share, "share of the cells", "1"),
                 "standard_error": create_variable("attractor", error, "of the share, as of random states", "1"),
                 "period": create_variable("attractor", period, "periods of the motion"),
-                "impacts": create_variable("attractor", impacts, "impacts in a period of the orbit"),
-                "rests": create_variable("attractor", rests, "has a rest"),
+                "impact_count": create_variable("attractor", impacts, "impacts in a period of the orbit"),
+                "has_rest": create_variable("attractor", rests, "has a rest"),
                 "multiplier": create_variable("attractor", multiplier, "largest multiplier in size", "1"),
                 "orbit_coordinate": create_variable(orbit_dims, points[..., 0], f"{name} on the orbit", unit),
                 "orbit_velocity": create_variable(orbit_dims, points[..., 1], "rate on the orbit", f"{unit}/s"),

@@ -78,7 +78,7 @@ class BifurcationDiagram(DatasetResult):
     [1, 2]
     """
 
-    TABLES: ClassVar = {"states": ("coordinate", "velocity"), "orbits": ("period", "impacts")}
+    TABLES: ClassVar = {"states": ("coordinate", "velocity"), "orbits": ("period", "impact_count")}
 
     def changes(self, direction: str | None = None, start: int = 0) -> list[tuple[float, float, int, int]]:
         """List the changes of the period in the order of the computation.
@@ -128,7 +128,7 @@ class BifurcationDiagram(DatasetResult):
             "value": data.value.values,
             "starts": np.stack([data.start_coordinate.values, data.start_velocity.values], axis=-1),
             "period": data.period.values,
-            "impacts": data.impacts.values,
+            "impacts": data.impact_count.values,
             "changes": {
                 direction: [self.changes(direction, start) for start in range(data.sizes["start"])]
                 for direction in data.direction.values.tolist()
@@ -275,7 +275,7 @@ def bifurcation_diagram(
             "coordinate": create_variable(state_dimensions, states[..., 0], coordinate.name, coordinate.unit),
             "velocity": create_variable(state_dimensions, states[..., 1], coordinate.rate_name, f"{coordinate.unit}/s"),
             "period": create_variable(orbit_dimensions, periods, meaning_of_period),
-            "impacts": create_variable(orbit_dimensions, impacts, meaning_of_impacts),
+            "impact_count": create_variable(orbit_dimensions, impacts, meaning_of_impacts),
             "start_coordinate": create_variable("start", initial_states[:, 0], "initial state", coordinate.unit),
             "start_velocity": create_variable("start", initial_states[:, 1], "initial state", f"{coordinate.unit}/s"),
         },
@@ -376,15 +376,15 @@ class LyapunovExponents(Result):
         zero, because neighbouring states never rest.
     standard_error : float
         Standard error of both, from the means of 20 consecutive parts of the orbit.
-    forcing_period, n_periods : float, int
+    forcing_period, period_count : float, int
         Period of the motion, s, and number of averaged periods.
-    impacts : float
+    impacts_per_period : float
         Number of impacts per period.
     share_at_rest : float
         Fraction of the known periods in which the body comes to rest or is at rest; NaN if no period is known.
     outcome : PeriodOutcome
         Final condition of the body.
-    stretches : ndarray, shape (n_periods, 2)
+    stretches : ndarray, shape (period_count, 2)
         Logarithms of the stretches in each period.
 
     See Also
@@ -396,7 +396,7 @@ class LyapunovExponents(Result):
     >>> from rocking import dynamics, pulses
     >>> ball, shaking = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(13.0, 5.0, cycles=1)
     >>> exponents = dynamics.lyapunov_exponents(ball, shaking, [0.1, 0.5])
-    >>> f"largest exponent {exponents.largest:.4f}, impacts per period {exponents.impacts:.0f}"
+    >>> f"largest exponent {exponents.largest:.4f}, impacts per period {exponents.impacts_per_period:.0f}"
     'largest exponent -0.6931, impacts per period 1'
     """
 
@@ -404,21 +404,21 @@ class LyapunovExponents(Result):
     smallest: float
     standard_error: float
     forcing_period: float
-    n_periods: int
-    impacts: float
+    period_count: int
+    impacts_per_period: float
     share_at_rest: float
     outcome: PeriodOutcome
     stretches: Floats
 
     def summary(self) -> str:
-        averaging = f"over {format_count(self.n_periods, 'period')}"
+        averaging = f"over {format_count(self.period_count, 'period')}"
         if np.isnan(self.largest):
             return f"no Lyapunov exponents: the body overturns or cannot be followed {averaging}"
         if np.isneginf(self.largest):
             rests = f"the body comes to rest in {100.0 * self.share_at_rest:.3g} % of the periods"
             return f"Lyapunov exponents: minus infinity; {rests}, {averaging}"
         exponents = f"{self.largest:.6g} and {self.smallest:.6g} per period (standard error {self.standard_error:.1g})"
-        return f"Lyapunov exponents: {exponents}, {averaging}, {self.impacts:.4g} impacts in each"
+        return f"Lyapunov exponents: {exponents}, {averaging}, {self.impacts_per_period:.4g} impacts in each"
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -426,8 +426,8 @@ class LyapunovExponents(Result):
             "smallest_per_period": self.smallest,
             "standard_error": self.standard_error,
             "period_s": self.forcing_period,
-            "periods": self.n_periods,
-            "impacts_per_period": self.impacts,
+            "periods": self.period_count,
+            "impacts_per_period": self.impacts_per_period,
             "share_of_periods_with_rest": self.share_at_rest,
             "outcome": self.outcome.name,
         }
@@ -437,7 +437,7 @@ def lyapunov_exponents(
     body: Body,
     motion: Motion,
     state: ArrayLike,
-    n_periods: int = 1000,
+    period_count: int = 1000,
     *,
     transient_periods: int = 200,
     model: Model | None = None,
@@ -451,7 +451,7 @@ def lyapunov_exponents(
         As in `stroboscopic_map`.
     state : array_like, shape (2,)
         Coordinate and velocity at the start of a period.
-    n_periods : int
+    period_count : int
         Number of averaged periods.
     transient_periods : int
         Number of preceding periods, in which the direction aligns with the fastest growth.
@@ -495,17 +495,17 @@ def lyapunov_exponents(
     if (shape := initial_state.shape) != (2,):
         raise OptionError(f"{{}} must be one pair (coordinate, velocity), not of shape {shape}", "state")
     strobe._check_starts(initial_state, "state")
-    count = checks.integer(n_periods, "n_periods", OptionError, minimum=_BATCH_COUNT)
+    count = checks.integer(period_count, "period_count", OptionError, minimum=_BATCH_COUNT)
     transient_count = checks.integer(transient_periods, "transient_periods", OptionError, minimum=0)
-    record, arguments = strobe._to_records(initial_state[None])[1][0], strobe._create_derivative_arguments()
+    struct, arguments = strobe._to_structs(initial_state[None])[1][0], strobe._create_derivative_arguments()
     total = transient_count + count
     frame, logs, impacts = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), np.full((total, 2), np.nan), 0
     for start, stop in pairwise(sorted({*range(0, total, STATES_PER_CALL), transient_count, total})):
-        new_impacts = measure_stretches(*arguments, record, frame, logs[start:stop])
+        new_impacts = measure_stretches(*arguments, struct, frame, logs[start:stop])
         impacts += new_impacts if start >= transient_count else 0
-        if record["ending"] not in (PeriodOutcome.MOVES, PeriodOutcome.RESTS):
+        if struct["status"] not in (PeriodOutcome.MOVES, PeriodOutcome.RESTS):
             break
-    outcome, logs = PeriodOutcome(int(record["ending"])), logs[transient_count:]
+    outcome, logs = PeriodOutcome(int(struct["status"])), logs[transient_count:]
     if outcome == PeriodOutcome.RESTS_FOR_EVER:
         logs[np.isnan(logs)] = -np.inf
     rests = np.isneginf(logs[:, 0])
@@ -520,15 +520,15 @@ def lyapunov_exponents(
     if known.all():  # otherwise the later periods are unknown, despite earlier rests
         mean[:] = [-np.inf if np.isneginf(column).any() else weights @ column for column in logs.T]
     if np.isfinite(logs[:, 0]).all():  # standard error of an unweighted mean, from consecutive parts
-        means = [batch.mean() for batch in np.array_split(logs[:, 0], _BATCH_COUNT)]
+        means = [part.mean() for part in np.array_split(logs[:, 0], _BATCH_COUNT)]
         error = float(np.std(means, ddof=1) / np.sqrt(_BATCH_COUNT))
     return LyapunovExponents(
         largest=float(mean[0]),
         smallest=float(mean[1]),
         standard_error=error * float(np.sqrt(count * np.sum(weights**2))),
         forcing_period=strobe.forcing_period,
-        n_periods=count,
-        impacts=impacts / count,
+        period_count=count,
+        impacts_per_period=impacts / count,
         share_at_rest=float(np.mean(rests[known])) if known.any() else float("nan"),
         outcome=outcome,
         stretches=logs,

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import rocking.response
-from rocking.block.body import BODIES_TYPES, Coordinate
+from rocking.block.body import BODIES_TYPES, CoordinateLabels
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers, unwrap_scalar
 from rocking.core.constants import STANDARD_GRAVITY, Model
@@ -55,7 +55,7 @@ class EquationOfMotion(NamedTuple):
 class LinearBody(ABC):
     """Base class of the bodies, which implements the protocol `rocking.block.body.Body`."""
 
-    coordinate: ClassVar[Coordinate] = Coordinate("position", "velocity", "acceleration", "m")
+    coordinate: ClassVar[CoordinateLabels] = CoordinateLabels("position", "velocity", "acceleration", "m")
     balance: ClassVar[tuple[float, float]] = (math.inf, math.inf)
     contact_law: ClassVar[None] = None
     kind: ClassVar[str]
@@ -189,22 +189,22 @@ class LinearBodies:
     def speed_thresholds(self, share: float) -> Floats:
         return np.full((len(self), 2), share)  # these bodies have no natural speed
 
-    def create_kernel_records(self, model: Model, thresholds: Floats) -> state.Records:
+    def create_kernel_structs(self, model: Model, thresholds: Floats) -> state.Structs:
         _require_linear_model(model)
-        records = state.create_records(len(self), state.BLOCK_DTYPE)
+        structs = state.create_structs(len(self), state.BLOCK_DTYPE)
         equations = np.array([body.equation for body in self.members])
         two_stops = np.isfinite(equations[:, 4])
-        records["stiffness"] = equations[:, :1]
-        records["damping"] = equations[:, 1:2]
-        records["restrained"] = equations[:, 1] > 0.0
-        records["restoring_gain"] = self.gravity
-        records["threshold"] = np.array([body.uplift_thresholds() for body in self.members]) / self.gravity
-        records["restitution"] = self.restitution
-        records["two_stops"] = two_stops
-        records["next_side"][:, 1] = two_stops
-        records["overturn_angle"] = equations[:, 4] - equations[:, 3]
-        records["rest_limit"] = thresholds
-        return records
+        structs["stiffness"] = equations[:, :1]
+        structs["damping"] = equations[:, 1:2]
+        structs["restrained"] = equations[:, 1] > 0.0
+        structs["restoring_gain"] = self.gravity
+        structs["threshold"] = np.array([body.uplift_thresholds() for body in self.members]) / self.gravity
+        structs["restitution"] = self.restitution
+        structs["two_stops"] = two_stops
+        structs["next_side"][:, 1] = two_stops
+        structs["overturn_angle"] = equations[:, 4] - equations[:, 3]
+        structs["rest_limit"] = thresholds
+        return structs
 
     def _repeat_for_stops(self, name: str) -> Floats:
         values = [getattr(body, name) for body in self.members]

@@ -157,7 +157,7 @@ class Branch(Result):
         body, motion = self.family(float(self.values[index]))
         return create_orbit(StroboscopicMap(body, motion, self.model, self.chattering), self.states[index], self.period)
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         impacts = "complete chattering" if math.isinf(self.impacts) else format_count(int(self.impacts), "impact")
         low, high = float(self.values.min()), float(self.values.max())
         unit = "" if self.unit == "1" else f" {self.unit}"
@@ -166,7 +166,7 @@ class Branch(Result):
 
     def summary(self) -> str:
         stable = self.is_stable
-        lines = [self._headline(), f"{len(self)} points, {int(np.sum(stable))} of them stable"]
+        lines = [self._format_headline(), f"{len(self)} points, {int(np.sum(stable))} of them stable"]
         if points := self.bifurcations:
             header = ["bifurcation", add_unit(self.name, self.unit), "multipliers"]
             rows = [[kind, f"{x:.12g}", _format_multipliers(orbit.multipliers)] for kind, x, _, orbit in points]
@@ -232,7 +232,7 @@ class Branch(Result):
         has_constant_peak = float(np.ptp(peaks)) <= 1e-9 * float(np.max(peaks))
         quantity = f"{coordinate.name} at the start of a period" if has_constant_peak else f"largest {coordinate.name}"
         periods = ", ".join(str(period) for period in sorted({branch.period for branch in branches}))
-        headline = f"orbits of {periods} periods, in {len(branches)} branches" if others else self._headline()
+        headline = f"orbits of {periods} periods, in {len(branches)} branches" if others else self._format_headline()
         heights = [branch.states[:, 0] if has_constant_peak else branch.peaks for branch in branches]
         marks = []
         for kind, value, _, orbit in bifurcations:

@@ -140,7 +140,8 @@ def continue_orbit(
     values, states, multipliers, peaks = (np.array(column) for column in zip(*points, strict=True))
     return Branch(
         family, name, unit, orbit.model, orbit.chattering, (low, high), orbit.period, values, states, multipliers,
-        orbit.impacts, peaks, (*reversed(backward.bifurcations), *forward.bifurcations), (backward.end, forward.end),
+        orbit.impact_count, peaks, (*reversed(backward.bifurcations), *forward.bifurcations),
+        (backward.end, forward.end),
     )  # fmt: skip
 
 
@@ -231,7 +232,7 @@ class _BranchWalk:
         return ""
 
     def shorten(self) -> None:
-        """Halve a step that failed, and record its length unless the branch bends."""
+        """Halve a step that failed, and struct its length unless the branch bends."""
         # After a longer step a distant point may belong to another branch.
         if not (self.is_bent and self.step > 1e-3):
             self.distance_to_end, self.successes = self.step, 0
@@ -302,7 +303,7 @@ class _BranchWalk:
         """Extrapolate the speed of the slowest impact to zero (grazing), where the equations are singular."""
         speed, equations = float(np.min(self.response.impacts["speed_before"], initial=math.inf)), self.equations
         self.slowest_impacts.append((speed, self.z[2]))
-        if equations.kind.rests or speed >= 2e-3 * equations.sizes[1]:
+        if equations.kind.has_rest or speed >= 2e-3 * equations.sizes[1]:
             return None
         fitted: list[tuple[float, float]] = []
         for impact in reversed(self.slowest_impacts):
@@ -366,10 +367,10 @@ class _BranchWalk:
                 return branches.OVERTURNING
             if kind_beyond.rests_forever != kind.rests_forever:
                 return branches.UPLIFT
-            if kind_beyond.rests != kind.rests:
-                return branches.START_OF_REST if kind_beyond.rests else branches.LOSS_OF_CHATTERING
+            if kind_beyond.has_rest != kind.has_rest:
+                return branches.START_OF_REST if kind_beyond.has_rest else branches.LOSS_OF_CHATTERING
             if kind_beyond != kind:
                 return branches.GRAZING
-            rests_differently = kind.rests and not kind.rests_forever
+            rests_differently = kind.has_rest and not kind.rests_forever
         # A body that uplifts and rests as before has touched or missed a stop in between.
         return branches.GRAZING if rests_differently else branches.END_LOST

@@ -69,68 +69,68 @@ class PeriodicallyForcedBody:
         self._ground = create_repeated_ground(self.motion, self.body.gravity)
         setup = Setup(self.bodies, self.model, self.chattering, self.forcing_period)
         run = setup.prepare(self.motion, ground=self._ground)
-        self._body_records, self._settings = run.records, run.settings
-        self._settings["stop"], self._settings["no_end_time"] = np.inf, True
-        if np.any(self._body_records["yielding"]):
+        self._body_structs, self._settings = run.structs, run.settings
+        self._settings["stop_time"], self._settings["no_end_time"] = np.inf, True
+        if np.any(self._body_structs["yielding"]):
             reason = "which stroboscopic maps do not support"
             raise BlockError(f"yielding tendons have internal state, {reason}: remove the tendon")
-        if np.any(self._body_records["variable_restitution"] & (self._body_records["seed"] >= 0)):
+        if np.any(self._body_structs["variable_restitution"] & (self._body_structs["seed"] >= 0)):
             raise OptionError(
                 "stroboscopic maps do not support restitution drawn at random at each impact: specify a number, or a "
                 "restitution that decreases with the speed"
             )
-        rows = build_step_rows(self._ground, self._body_records[0])
+        rows = build_step_rows(self._ground, self._body_structs[0])
         self._steps = rows if self.model == "linear" else rows[:, :0]
 
     def __repr__(self) -> str:
         inputs = f"{describe_input(self.body)} under {describe_input(self.motion)}"
         return f"<{type(self).__name__}: {inputs}; {self.model} model>"
 
-    def _copy_settings(self, *, stores_nodes: bool) -> state.Record:
+    def _copy_settings(self, *, stores_nodes: bool) -> state.Struct:
         settings = self._settings.copy()
         settings["writes_tables"] = stores_nodes
         return settings
 
     def _create_problem(self) -> PeriodicProblem:
         settings = self._copy_settings(stores_nodes=False)
-        return PeriodicProblem(self._ground, self._body_records[0], settings, state.create_table(0), self._steps)
+        return PeriodicProblem(self._ground, self._body_structs[0], settings, state.create_table(0), self._steps)
 
-    def _create_derivative_arguments(self) -> tuple[Trail, state.Record, state.Record, state.Records]:
+    def _create_derivative_arguments(self) -> tuple[Trail, state.Struct, state.Struct, state.Structs]:
         """Create the problem and the workspace of the derivative kernels."""
-        trail = Trail(self._ground, self._body_records[0], self._copy_settings(stores_nodes=True), NO_NODES)
-        return trail, state.create_scratch(), state.create_record(state.VARIATION_DTYPE), state.create_table(512)
+        trail = Trail(self._ground, self._body_structs[0], self._copy_settings(stores_nodes=True), NO_NODES)
+        return trail, state.create_scratch(), state.create_struct(state.VARIATION_DTYPE), state.create_table(512)
 
     def _check_starts(self, starts: ArrayLike, name: str) -> Floats:
         """Return initial states, shape (n, 2), after checking that they are finite and in front of the stops."""
         states = checks.numbers(starts, name, OptionError)
-        self._to_records(states, name)
+        self._to_structs(states, name)
         check_magnitudes(states, name)
         return states.reshape(-1, 2)
 
-    def _to_records(
+    def _to_structs(
         self, states: ArrayLike, name: str = "states", velocities: str = ""
-    ) -> tuple[Floats, state.Records]:
-        """Return states as an array and as records; ``name`` and ``velocities`` are the argument names for errors."""
+    ) -> tuple[Floats, state.Structs]:
+        """Return states as an array and as structs; ``name`` and ``velocities`` are the argument names for errors."""
         pairs = self._check_pairs(states, name, self.body.coordinate.name)
         flat = pairs.reshape(-1, 2)
-        (coordinate, velocity), record, (low, high) = flat.T, self._body_records[0], self.body.stops
-        if record["next_side"][0] == 0:  # a stop, which the body cannot pass
-            leads_into_second = bool(record["two_stops"]) & (coordinate == high) & (velocity > 0.0)
+        (coordinate, velocity), struct, (low, high) = flat.T, self._body_structs[0], self.body.stops
+        if struct["next_side"][0] == 0:  # a stop, which the body cannot pass
+            leads_into_second = bool(struct["two_stops"]) & (coordinate == high) & (velocity > 0.0)
             leads_into_stop = (coordinate == low) & (velocity < 0.0) | leads_into_second
             if np.any(leads_into_stop):
                 x, v = float(coordinate[leads_into_stop][0]), float(velocity[leads_into_stop][0])
                 message = f"{{}} must not point into a stop; got {v:g} m/s at {x:g} m"
                 correction = "change its sign, or begin in front of the stop"
                 raise OptionError(f"{message}; {correction}", velocities or name, value=v)
-        records = state.create_states(len(flat), 0)
-        set_start(records, self._body_records, self.bodies, coordinate, velocity, name)
-        records["peak"] = self._initial_peak
-        return pairs, records
+        structs = state.create_states(len(flat), 0)
+        set_start(structs, self._body_structs, self.bodies, coordinate, velocity, name)
+        structs["peak"] = self._initial_peak
+        return pairs, structs
 
     @property
     def _initial_peak(self) -> float:
         """Initial peak that disables the search for peaks: the overturning angle less rounding error."""
-        overturn_angle = float(self._body_records["overturn_angle"][0])
+        overturn_angle = float(self._body_structs["overturn_angle"][0])
         return overturn_angle if np.isinf(overturn_angle) else overturn_angle * _BELOW_ONE
 
     def _check_pairs(self, values: ArrayLike, name: str, coordinate: str) -> Floats:
@@ -150,22 +150,22 @@ class PeriodicallyForcedBody:
         coordinates[side < 0] = np.stack([stops, np.zeros_like(stops)], axis=-1)[side < 0]
         return coordinates + 0.0
 
-    def _from_records(self, records: state.Records) -> Floats:
-        """Convert records to coordinates and velocities, NaN after overturning or too many steps."""
-        coordinates = self._to_coordinates(records["u"], records["v"], records["side"])
-        coordinates[np.isin(records["ending"], (PeriodOutcome.OVERTURNED, PeriodOutcome.UNFINISHED))] = np.nan
+    def _from_structs(self, structs: state.Structs) -> Floats:
+        """Convert structs to coordinates and velocities, NaN after overturning or too many steps."""
+        coordinates = self._to_coordinates(structs["u"], structs["v"], structs["side"])
+        coordinates[np.isin(structs["status"], (PeriodOutcome.OVERTURNED, PeriodOutcome.UNFINISHED))] = np.nan
         return coordinates
 
     @property
     def _is_two_sided(self) -> bool:
         """Whether the coordinate changes its sign, or there is a second stop."""
-        record = self._body_records[0]
-        return bool(record["two_stops"] or record["next_side"][0] == 1)
+        struct = self._body_structs[0]
+        return bool(struct["two_stops"] or struct["next_side"][0] == 1)
 
     @property
     def _conserves_energy(self) -> bool:
         """Whether two successive impacts lose no speed, so that states near a rest never rest."""
-        return bool(np.prod(self._body_records[0]["restitution"]) >= 1.0)
+        return bool(np.prod(self._body_structs[0]["restitution"]) >= 1.0)
 
 
 class StateScale(NamedTuple):
@@ -177,15 +177,15 @@ class StateScale(NamedTuple):
 
 def compute_scale(forced_body: PeriodicallyForcedBody) -> StateScale:
     """Compute the natural scales of coordinate and velocity of a body under a motion."""
-    record, period = forced_body._body_records[0], forced_body.forcing_period
+    struct, period = forced_body._body_structs[0], forced_body.forcing_period
     if not isinstance(forced_body.body, LinearBody):
-        alpha = float(np.max(record["slenderness"]))
-        return StateScale(alpha, alpha * math.sqrt(float(np.max(np.abs(record["stiffness"])))))
-    pull = float(np.max(np.abs(record["restoring_gain"] * record["threshold"])[: 2 if record["two_stops"] else 1]))
+        alpha = float(np.max(struct["slenderness"]))
+        return StateScale(alpha, alpha * math.sqrt(float(np.max(np.abs(struct["stiffness"])))))
+    pull = float(np.max(np.abs(struct["restoring_gain"] * struct["threshold"])[: 2 if struct["two_stops"] else 1]))
     speed = period * max(estimate_mean_acceleration(forced_body.motion), pull, 1e-300)
-    rate = math.sqrt(abs(float(record["stiffness"][0])))
-    if record["two_stops"]:
-        width = float(record["overturn_angle"])
+    rate = math.sqrt(abs(float(struct["stiffness"][0])))
+    if struct["two_stops"]:
+        width = float(struct["overturn_angle"])
         return StateScale(width, max(width * rate, width / period))
     return StateScale(speed / max(rate, 1.0 / period), speed)
 
@@ -250,7 +250,7 @@ class StroboscopicMap(PeriodicallyForcedBody):
     (0.2, [0.07887, 0.732401])
     """
 
-    def __call__(self, states: ArrayLike, n_periods: int = 1) -> Floats:
+    def __call__(self, states: ArrayLike, period_count: int = 1) -> Floats:
         """Return states after a number of periods.
 
         Parameters
@@ -258,7 +258,7 @@ class StroboscopicMap(PeriodicallyForcedBody):
         states : array_like, shape (..., 2)
             Coordinate and velocity at the start of a period, in rad and rad/s for a block, in m and m/s for other
             bodies.
-        n_periods : int
+        period_count : int
             Number of periods.
 
         Returns
@@ -272,44 +272,44 @@ class StroboscopicMap(PeriodicallyForcedBody):
         OptionError
             If the states have another shape, or a state is behind a stop.
         """
-        final_states, _, _ = self.advance(states, n_periods)
+        final_states, _, _ = self.advance(states, period_count)
         return final_states
 
-    def orbit(self, states: ArrayLike, n_periods: int) -> Floats:
-        """Return states after 0, 1, ... periods, shape (..., n_periods + 1, 2), as the map does."""
-        pairs, records = self._to_records(states)
-        count = checks.integer(n_periods, "n_periods", OptionError, minimum=1)
-        rows = np.full((len(records), count, 3), np.nan)
-        self._iterate(records, count, rows)
+    def orbit(self, states: ArrayLike, period_count: int) -> Floats:
+        """Return states after 0, 1, ... periods, shape (..., period_count + 1, 2), as the map does."""
+        pairs, structs = self._to_structs(states)
+        count = checks.integer(period_count, "period_count", OptionError, minimum=1)
+        rows = np.full((len(structs), count, 3), np.nan)
+        self._iterate(structs, count, rows)
         u, v, side = np.moveaxis(rows, -1, 0)
         later_states = self._to_coordinates(u, v, np.where(np.isnan(u), 0.0, side).astype(np.int64))
         orbit = np.concatenate([pairs.reshape(-1, 1, 2), later_states], axis=1)
         return orbit.reshape(*pairs.shape[:-1], count + 1, 2)
 
-    def advance(self, states: ArrayLike, n_periods: int = 1) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
+    def advance(self, states: ArrayLike, period_count: int = 1) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
         """Return states after a number of periods, the `PeriodOutcome` of each, and the numbers of resolved impacts."""
-        pairs, records = self._to_records(states)
-        self._iterate(records, checks.integer(n_periods, "n_periods", OptionError, minimum=1))
-        outcomes, impacts = (np.array(records[name]).reshape(pairs.shape[:-1]) for name in ("ending", "impacts"))
-        return self._from_records(records).reshape(pairs.shape), outcomes, impacts
+        pairs, structs = self._to_structs(states)
+        self._iterate(structs, checks.integer(period_count, "period_count", OptionError, minimum=1))
+        outcomes, impacts = (np.array(structs[name]).reshape(pairs.shape[:-1]) for name in ("status", "impacts"))
+        return self._from_structs(structs).reshape(pairs.shape), outcomes, impacts
 
-    def derivative(self, states: ArrayLike, n_periods: int = 1) -> tuple[Floats, Floats]:
+    def derivative(self, states: ArrayLike, period_count: int = 1) -> tuple[Floats, Floats]:
         """Return states after a number of periods and their derivatives by the initial states, shape (..., 2, 2).
 
         Derivatives are exactly zero if the body comes to rest in between or is held at rest at the start, NaN after
         overturning, and infinite at a grazing impact. On a stop that does not hold the body, they apply to states in
         front of the stop. Arcs contribute solutions of the variational equation, impacts saltation matrices.
         """
-        pairs, records = self._to_records(states)
-        product = np.broadcast_to(np.eye(2), (len(records), 2, 2)).copy()
-        change, ended = np.empty_like(product), np.zeros(len(records), dtype=np.bool_)
-        for _ in range(checks.integer(n_periods, "n_periods", OptionError, minimum=1)):
-            signs, initial_states = _compute_signs(records["side"]), records.copy()
-            self._iterate(records)
+        pairs, structs = self._to_structs(states)
+        product = np.broadcast_to(np.eye(2), (len(structs), 2, 2)).copy()
+        change, ended = np.empty_like(product), np.zeros(len(structs), dtype=np.bool_)
+        for _ in range(checks.integer(period_count, "period_count", OptionError, minimum=1)):
+            signs, initial_states = _compute_signs(structs["side"]), structs.copy()
+            self._iterate(structs)
             differentiate_periods(*self._create_derivative_arguments(), state.expose_fields(initial_states), change)
-            ended |= np.isin(records["ending"], (PeriodOutcome.OVERTURNED, PeriodOutcome.UNFINISHED))
-            product = (signs * _compute_signs(records["side"]))[:, None, None] * change @ product
-        final_states = self._to_coordinates(records["u"], records["v"], records["side"])
+            ended |= np.isin(structs["status"], (PeriodOutcome.OVERTURNED, PeriodOutcome.UNFINISHED))
+            product = (signs * _compute_signs(structs["side"]))[:, None, None] * change @ product
+        final_states = self._to_coordinates(structs["u"], structs["v"], structs["side"])
         final_states[ended] = product[ended] = np.nan
         return final_states.reshape(pairs.shape), product.reshape(*pairs.shape, 2)
 
@@ -323,32 +323,32 @@ class StroboscopicMap(PeriodicallyForcedBody):
         """
         pairs = self._check_pairs(impacts, "impacts", "phase in s")
         flat = pairs.reshape(-1, 2)
-        records = state.create_states(len(flat), 0)
+        structs = state.create_states(len(flat), 0)
         phase = np.mod(np.where(np.isfinite(flat[:, 0]), flat[:, 0], np.nan), self.forcing_period)
         starts = self._ground.pieces[: (len(self._ground.pieces) - 3) // 2, 0]
-        records["piece"] = np.searchsorted(starts, phase, side="right") - 1
-        records["offset"] = phase - starts[records["piece"]]
-        records["side"] = np.where(flat[:, 1] < 0.0, 1, 0)
-        records["v"] = np.where(np.isnan(phase), np.nan, np.abs(flat[:, 1]))
+        structs["piece"] = np.searchsorted(starts, phase, side="right") - 1
+        structs["offset"] = phase - starts[structs["piece"]]
+        structs["side"] = np.where(flat[:, 1] < 0.0, 1, 0)
+        structs["v"] = np.where(np.isnan(phase), np.nan, np.abs(flat[:, 1]))
         if np.any(flat[:, 1] == 0.0) or (not self._is_two_sided and np.any(flat[:, 1] < 0.0)):
             raise OptionError("every velocity in {} must point away from the stop of the impact", "impacts")
-        records["peak"] = self._initial_peak
-        self._iterate(records)
-        return self._from_records(records).reshape(pairs.shape)
+        structs["peak"] = self._initial_peak
+        self._iterate(structs)
+        return self._from_structs(structs).reshape(pairs.shape)
 
     def _iterate(
-        self, records: state.Records, n_periods: int = 1, rows: Floats | None = None, traps: Floats = _NO_TRAPS
+        self, structs: state.Structs, period_count: int = 1, rows: Floats | None = None, traps: Floats = _NO_TRAPS
     ) -> tuple[Integers, Integers]:
         """Advance states, up to traps; write their orbits, and return the trap (or -1) and periods of each."""
         problem = self._create_problem()
-        orbits = np.empty((len(records), 0, 3)) if rows is None else rows
-        reached, counts = np.empty((2, len(records)), dtype=np.int64)
+        orbits = np.empty((len(structs), 0, 3)) if rows is None else rows
+        reached, counts = np.empty((2, len(structs)), dtype=np.int64)
 
         def advance_part(part: slice) -> None:
             outputs = reached[part], counts[part]
-            iterate_periods(problem, state.create_scratch(), records[part], n_periods, orbits[part], traps, *outputs)
+            iterate_periods(problem, state.create_scratch(), structs[part], period_count, orbits[part], traps, *outputs)
 
-        for _ in map_in_threads(advance_part, split_states(len(records), n_periods)):
+        for _ in map_in_threads(advance_part, split_states(len(structs), period_count)):
             pass
         return reached, counts
 
@@ -365,10 +365,10 @@ class HalfMap(StroboscopicMap):
         self._ground = create_repeated_ground(half, self.body.gravity, -1.0)
         self._steps = np.ascontiguousarray(self._steps[:, :middle])  # as kernels require
 
-    def map_to_mirror_image(self, state: Floats, n_halves: int) -> tuple[Floats, Floats]:
+    def map_to_mirror_image(self, state: Floats, half_count: int) -> tuple[Floats, Floats]:
         """Return the mirror image after an odd number of half periods, and its derivative; NaN where it overturns."""
         product, mirror_image = np.eye(2), state
-        for _ in range(n_halves):
+        for _ in range(half_count):
             if not np.all(np.isfinite(mirror_image)):  # a NaN state would use up the step budget
                 break
             image, change = self.derivative(mirror_image)

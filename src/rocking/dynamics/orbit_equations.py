@@ -51,11 +51,11 @@ class OrbitKind(NamedTuple):
     """Properties of orbits that are constant along a branch."""
 
     #: Whether every period contains a rest.
-    rests: bool
+    has_rest: bool
     #: Whether the body is always at rest.
     rests_forever: bool
     #: Number of impacts in one period; 0 with a rest.
-    impacts: int
+    impact_count: int
     #: Whether the body overturns.
     overturns: bool
     #: Whether the response is unknown because it requires too many steps.
@@ -125,7 +125,7 @@ class OrbitEquations:
             raise OptionError(message, "family", "value", value=value)
         sizes, kind = np.array([*scale, bounds[1] - bounds[0]]), determine_kind(strobe, orbit.state, orbit.period)
         equations = cls(family, orbit.model, orbit.chattering, orbit.period, sizes, kind, bounds)  # type: ignore[arg-type]
-        equations.uses_half_map = orbit.is_symmetric and not orbit.rests and equations.is_mirrored_throughout(value)
+        equations.uses_half_map = orbit.is_symmetric and not orbit.has_rest and equations.is_mirrored_throughout(value)
         return equations
 
     def _create_map(self, value: float) -> StroboscopicMap:
@@ -225,7 +225,7 @@ class OrbitEquations:
     def is_parent(self, z: Floats) -> bool:
         """Whether a point belongs to symmetric orbits, or to those of half the period, where this branch starts."""
         state, value = self.to_physical(z)
-        if self.kind.rests or self.uses_half_map:
+        if self.kind.has_rest or self.uses_half_map:
             return False
         if self.period % 2 == 0:
             image = self.create_map(value)(state, self.period // 2)

@@ -54,12 +54,12 @@ class PeriodicOrbit(Result):
         Coordinate and velocity at the start of a period of the motion.
     period : int
         Least period of the orbit, in periods of the motion.
-    impacts : float
+    impact_count : float
         Number of impacts in one period: an integer, or infinity with complete chattering.
     multipliers : ndarray of complex, shape (2,)
         Floquet multipliers, the largest first (eigenvalues of the derivative of the map over the period). They are
         exactly zero with a proven rest, and one at rest without energy loss, because neighbouring states never rest.
-    is_symmetric, rests : bool
+    is_symmetric, has_rest : bool
         Whether the orbit equals its mirror image half a period later, and whether every period contains a rest.
 
     See Also
@@ -72,7 +72,7 @@ class PeriodicOrbit(Result):
     >>> from rocking import dynamics, pulses
     >>> ball, shaking = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(12.0, 5.0, cycles=1)
     >>> orbit = next(orbit for orbit in dynamics.periodic_orbits(ball, shaking) if orbit.is_stable)
-    >>> orbit.period, orbit.impacts, orbit.state.round(6).tolist()
+    >>> orbit.period, orbit.impact_count, orbit.state.round(6).tolist()
     (1, 1.0, [0.054619, 0.544362])
     """
 
@@ -84,10 +84,10 @@ class PeriodicOrbit(Result):
     chattering: ChatteringScheme
     state: Floats
     period: int
-    impacts: float
+    impact_count: float
     multipliers: NDArray[np.complex128]
     is_symmetric: bool
-    rests: bool
+    has_rest: bool
 
     @property
     def is_stable(self) -> bool:
@@ -117,12 +117,12 @@ class PeriodicOrbit(Result):
     def _description(self) -> str:
         grows = np.any(compute_moduli(self.multipliers) > 1.0)
         stable = "stable" if self.is_stable else "unstable" if grows else "neutral"
-        if self.rests and not self.impacts:
+        if self.has_rest and not self.impact_count:
             events = "always at rest"
-        elif math.isinf(self.impacts):
+        elif math.isinf(self.impact_count):
             events = "with complete chattering"
         else:
-            events = f"with {format_count(int(self.impacts), 'impact')}{' with a rest' if self.rests else ''}"
+            events = f"with {format_count(int(self.impact_count), 'impact')}{' with a rest' if self.has_rest else ''}"
         symmetric = " symmetric" if self.is_symmetric else ""
         return f"{stable}{symmetric} orbit of {format_count(self.period, 'period')} {events}"
 
@@ -136,7 +136,7 @@ class PeriodicOrbit(Result):
             texts.append(f"{multiplier.real:.3g}{imaginary}")
         return ", ".join(texts)
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         return f"{self._description}, multipliers {self._multiplier_text}"
 
     def summary(self) -> str:
@@ -162,9 +162,9 @@ class PeriodicOrbit(Result):
             "duration_s": self.duration,
             add_unit(coordinate.name, coordinate.unit): x,
             add_unit("velocity", f"{coordinate.unit}/s"): v,
-            "impacts": to_plain(self.impacts),
-            "complete_chattering": math.isinf(self.impacts),
-            "rests": self.rests,
+            "impact_count": to_plain(self.impact_count),
+            "complete_chattering": math.isinf(self.impact_count),
+            "has_rest": self.has_rest,
             "symmetric": self.is_symmetric,
             "stable": self.is_stable,
             "multipliers": [[float(multiplier.real), float(multiplier.imag)] for multiplier in self.multipliers],
@@ -253,10 +253,10 @@ def compute_multipliers(strobe: StroboscopicMap, derivative: Floats) -> NDArray[
 
     If impacts lose no energy, the multipliers at rest are one, because neighbouring states never rest.
     """
-    record = strobe._body_records[0]
+    struct = strobe._body_structs[0]
     if strobe._conserves_energy and not np.any(derivative):
         return np.ones(2, dtype=np.complex128)
-    if strobe._conserves_energy and not (record["variable_restitution"] or np.any(record["damping"])):
+    if strobe._conserves_energy and not (struct["variable_restitution"] or np.any(struct["damping"])):
         # Otherwise rounding errors of many impacts would make the orbit seem attracting.
         derivative = derivative / np.sqrt(np.abs(np.linalg.det(derivative)))
     multipliers = np.linalg.eigvals(derivative).astype(np.complex128)
@@ -323,10 +323,10 @@ def periodic_orbits(
     <PeriodicOrbit: stable orbit of 1 period with 1 impact, multipliers -0.0342 + 0.499i, -0.0342 - 0.499i>
     <PeriodicOrbit: stable orbit of 1 period with complete chattering, multipliers 0, 0>
     """
-    n_periods = checks.integer(period, "period", OptionError, minimum=1)
-    search = _OrbitSearch(StroboscopicMap(body, motion, model, chattering), n_periods)
+    period_count = checks.integer(period, "period", OptionError, minimum=1)
+    search = _OrbitSearch(StroboscopicMap(body, motion, model, chattering), period_count)
     distinct = np.empty((0, 2))
-    for state in search.find_recurrent(search.create_starts(starts), n_periods):
+    for state in search.find_recurrent(search.create_starts(starts), period_count):
         if not len(distinct) or np.min(search.compute_sizes(distinct - state)) > MAX_ORBIT_DISTANCE:
             distinct = np.vstack([distinct, state])
     orbits: list[PeriodicOrbit] = []
@@ -335,14 +335,14 @@ def periodic_orbits(
         differences = (shift - known.states for known in orbits if known.period == orbit.period for shift in shifts)
         if not any(np.max(search.compute_sizes(difference)) < MAX_ORBIT_DISTANCE for difference in differences):
             orbits.append(orbit)
-    return sorted(orbits, key=lambda orbit: (orbit.period, orbit.impacts, *orbit.state))
+    return sorted(orbits, key=lambda orbit: (orbit.period, orbit.impact_count, *orbit.state))
 
 
 class _OrbitSearch:
     """Search for states that recur after a number of periods."""
 
-    def __init__(self, strobe: StroboscopicMap, n_periods: int) -> None:
-        self.strobe, self.n_periods = strobe, n_periods
+    def __init__(self, strobe: StroboscopicMap, period_count: int) -> None:
+        self.strobe, self.period_count = strobe, period_count
         self.scale = compute_scale(strobe)
 
     def create_starts(self, requested: ArrayLike | int | None) -> Floats:
@@ -360,13 +360,13 @@ class _OrbitSearch:
         if is_two_sided:
             impacts = np.concatenate([impacts, impacts * [1.0, -1.0]])
         fractions = np.linspace(-0.9, 0.9, max(2, point_count // 4))
-        width = high - low if strobe._body_records[0]["two_stops"] else self.scale.coordinate
+        width = high - low if strobe._body_structs[0]["two_stops"] else self.scale.coordinate
         coordinates = 0.5 * (low + high) + 0.5 * width * fractions if is_two_sided else low + width * (1.0 + fractions)
         between = np.stack(np.meshgrid(coordinates, max_speed * fractions), axis=-1).reshape(-1, 2)
         rests = np.array([[stop, 0.0] for stop in {low, high}])
         states = np.concatenate([rests, between, strobe.convert_impacts(impacts)])
         states = states[self._are_admissible(states)]
-        later = strobe(states[::_LATER_STRIDE], _LATER_PERIOD_COUNT * self.n_periods)
+        later = strobe(states[::_LATER_STRIDE], _LATER_PERIOD_COUNT * self.period_count)
         return np.concatenate([states, later[self._are_admissible(later)]])
 
     def _estimate_max_speed(self) -> float:
@@ -374,31 +374,31 @@ class _OrbitSearch:
         strobe = self.strobe
         restitution = float(np.max(strobe.bodies.restitution))
         gain = restitution / max(1.0 - restitution, 1e-300)
-        push = self.n_periods * strobe.forcing_period * estimate_mean_acceleration(strobe.motion)
+        push = self.period_count * strobe.forcing_period * estimate_mean_acceleration(strobe.motion)
         speed = min(max(gain, _MIN_GAIN), _MAX_GAIN) * push or self.scale.velocity
-        record = strobe._body_records[0]
+        struct = strobe._body_structs[0]
         if not math.isinf(min(strobe.body.balance)):
             return min(speed, _MAX_BLOCK_SPEED * self.scale.velocity + push)
-        if float(record["stiffness"][0]) == 0.0:  # the flight time of a ball is proportional to its speed
-            pull = float(record["restoring_gain"][0] * record["threshold"][0])
-            return min(speed, 0.5 * self.n_periods * strobe.forcing_period * pull + push)
+        if float(struct["stiffness"][0]) == 0.0:  # the flight time of a ball is proportional to its speed
+            pull = float(struct["restoring_gain"][0] * struct["threshold"][0])
+            return min(speed, 0.5 * self.period_count * strobe.forcing_period * pull + push)
         return speed
 
     def _are_admissible(self, states: Floats) -> Flags:
         """Whether each state is admissible."""
-        record, (low, high) = self.strobe._body_records[0], self.strobe.body.stops
+        struct, (low, high) = self.strobe._body_structs[0], self.strobe.body.stops
         x, v = states.T
         admissible: Flags = np.all(np.isfinite(states), axis=-1)
-        if self.strobe._is_two_sided and not record["two_stops"]:
-            return np.asarray(admissible & (np.abs(x) < record["overturn_angle"]))
-        if record["two_stops"]:
+        if self.strobe._is_two_sided and not struct["two_stops"]:
+            return np.asarray(admissible & (np.abs(x) < struct["overturn_angle"]))
+        if struct["two_stops"]:
             admissible &= (x <= high) & ~((x == high) & (v > 0.0))
         return np.asarray(admissible & (x >= low) & ~((x == low) & (v < 0.0)))
 
-    def map_with_derivatives(self, states: Floats, n_periods: int) -> Floats:
+    def map_with_derivatives(self, states: Floats, period_count: int) -> Floats:
         """Compute rows of states, their images and derivatives, shape (n, 8); NaN for inadmissible states."""
         rows, admissible = np.full((len(states), 8), np.nan), self._are_admissible(states)
-        images, derivatives = self.strobe.derivative(states[admissible], n_periods)
+        images, derivatives = self.strobe.derivative(states[admissible], period_count)
         rows[:, :2], rows[admissible, 2:4], rows[admissible, 4:] = states, images, derivatives.reshape(-1, 4)
         return rows
 
@@ -409,9 +409,9 @@ class _OrbitSearch:
         # Larger residuals are never accepted, even with a large derivative.
         return residual, residual < np.minimum(tolerance, 1e-6)
 
-    def find_recurrent(self, states: Floats, n_periods: int) -> Floats:
+    def find_recurrent(self, states: Floats, period_count: int) -> Floats:
         """Find the recurrent states to which Newton's method converges."""
-        rows, done = self.map_with_derivatives(states, n_periods), np.zeros(len(states), dtype=bool)
+        rows, done = self.map_with_derivatives(states, period_count), np.zeros(len(states), dtype=bool)
         for _ in range(40):
             residual, accurate = self.compute_residuals(rows)
             active = np.flatnonzero(~(done & accurate) & np.isfinite(residual))
@@ -423,13 +423,13 @@ class _OrbitSearch:
             for halving in range(5):
                 remaining = np.flatnonzero(~better)
                 trials = rows[active[remaining], :2] + 0.5**halving * steps[remaining]
-                candidates = self.map_with_derivatives(trials, n_periods)
+                candidates = self.map_with_derivatives(trials, period_count)
                 # A step that is already accurate to rounding need not reduce the residual.
                 better[remaining] = reduced = self.compute_residuals(candidates)[0] < residual[active[remaining]]
                 new[remaining[reduced]] = candidates[reduced]
             stuck = ~better & ~accurate[active]
             if np.any(stuck):  # The map itself leads to an attractor.
-                new[stuck] = self.map_with_derivatives(new[stuck, 2:4], n_periods)
+                new[stuck] = self.map_with_derivatives(new[stuck, 2:4], period_count)
             rows[active] = new
         return rows[self.compute_residuals(rows)[1], :2]
 
@@ -440,14 +440,14 @@ class _OrbitSearch:
 
     def create_least_orbit(self, state: Floats) -> PeriodicOrbit:
         """Create the orbit of a state, with its least period."""
-        for divisor in range(1, self.n_periods):
-            if self.n_periods % divisor == 0:
+        for divisor in range(1, self.period_count):
+            if self.period_count % divisor == 0:
                 image = self.strobe(state, divisor)
                 if self.compute_sizes(image - state) < math.sqrt(MAX_ORBIT_DISTANCE):
                     recurrent = self.find_recurrent(state[None], divisor)
                     if len(recurrent) and self.compute_sizes(recurrent[0] - state) < MAX_ORBIT_DISTANCE:
                         return create_orbit(self.strobe, recurrent[0], divisor)
-        return create_orbit(self.strobe, state, self.n_periods)
+        return create_orbit(self.strobe, state, self.period_count)
 
 
 def _compute_newton_steps(rows: Floats) -> Floats:

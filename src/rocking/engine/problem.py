@@ -1,4 +1,4 @@
-"""Conversion of bodies, a motion and the settings of a simulation to the records and arrays that kernels accept."""
+"""Conversion of bodies, a motion and the settings of a simulation to the structs and arrays that kernels accept."""
 
 from __future__ import annotations
 
@@ -99,9 +99,9 @@ def compute_slenderness(bodies: Bodies) -> Floats:
 
 def compute_uplift_thresholds(bodies: Bodies, model: Model) -> tuple[Floats, Floats]:
     """Return uplift accelerations of each body and side, and the parts due to its own weight, m/s^2, shape (n, 2)."""
-    records = bodies.create_kernel_records(model, np.zeros((len(bodies), 2)))
-    weight_part = bodies.gravity * records["threshold"]
-    return weight_part + bodies.gravity * records["restraint_threshold"], weight_part
+    structs = bodies.create_kernel_structs(model, np.zeros((len(bodies), 2)))
+    weight_part = bodies.gravity * structs["threshold"]
+    return weight_part + bodies.gravity * structs["restraint_threshold"], weight_part
 
 
 def require_body(body: Body) -> Body:
@@ -112,8 +112,8 @@ def require_body(body: Body) -> Body:
 
 
 def set_start(
-    states: state.Records,
-    records: state.Records,
+    states: state.Structs,
+    structs: state.Structs,
     bodies: Bodies,
     coordinate: float | Floats | None,
     rate: float | Floats,
@@ -133,18 +133,18 @@ def set_start(
     is_at_rest = not isinstance(rate, np.ndarray) and rate == 0.0 and (coordinate is None or coordinate == 0.0)
     if is_at_rest and not np.count_nonzero(stops):
         return
-    has_two_stops, is_one_sided = records["two_stops"], records["next_side"][:, 0] == 0
+    has_two_stops, is_one_sided = structs["two_stops"], structs["next_side"][:, 0] == 0
     if coordinate is None:
         coordinate = np.clip(0.0, stops[:, 0], np.where(has_two_stops, stops[:, 1], np.inf))
     if not isinstance(rate, np.ndarray):  # arrays are already checked, and a body in them may have overturned
-        _check_start(coordinate, rate, records, bodies, name)
+        _check_start(coordinate, rate, structs, bodies, name)
     position, speed = np.asarray(coordinate, dtype=float), np.asarray(rate, dtype=float)
     from_plus = position - stops[:, 0]
     sign = np.where(is_one_sided, 1.0, np.sign(np.where(from_plus == 0.0, speed, from_plus)))
     is_at_second_stop = has_two_stops & (position == stops[:, 1])
     u, v = np.where(is_at_second_stop, 0.0, sign * from_plus), np.where(is_at_second_stop, -speed, sign * speed)
     is_invalid = is_one_sided & (
-        (u < 0.0) | (has_two_stops & (u > records["overturn_angle"])) | ((u == 0.0) & (v < 0.0))
+        (u < 0.0) | (has_two_stops & (u > structs["overturn_angle"])) | ((u == 0.0) & (v < 0.0))
     )
     if np.any(is_invalid):
         body = bodies[min(k := int(np.argmax(is_invalid)), len(bodies) - 1)]
@@ -162,25 +162,25 @@ def set_start(
     side = np.where((sign < 0.0) | is_at_second_stop, 1, 0)
     stands = (u == 0.0) & (v == 0.0)
     states["side"] = np.where(stands, np.where(has_two_stops, -1 - side, state.AT_REST), side)
-    states["u"], states["v"], states["peak"] = u, v, np.where(is_at_second_stop, records["overturn_angle"], u)
+    states["u"], states["v"], states["peak"] = u, v, np.where(is_at_second_stop, structs["overturn_angle"], u)
 
 
-def compute_peaks(states: state.Records, records: state.Records, stops: Floats) -> Floats:
+def compute_peaks(states: state.Structs, structs: state.Structs, stops: Floats) -> Floats:
     """Return peaks of coordinates from the peaks in the frame of side +, exactly the stop at a second stop."""
     peaks: Floats = states["peak"] + stops[..., 0]
-    if not records["two_stops"].any():
+    if not structs["two_stops"].any():
         return peaks
-    return np.where(records["two_stops"] & (states["peak"] >= records["overturn_angle"]), stops[..., 1], peaks)
+    return np.where(structs["two_stops"] & (states["peak"] >= structs["overturn_angle"]), stops[..., 1], peaks)
 
 
 def _check_start(
-    coordinate: float | Floats, rate: float, records: state.Records, bodies: Bodies, name: str | None
+    coordinate: float | Floats, rate: float, structs: state.Structs, bodies: Bodies, name: str | None
 ) -> None:
     """Check the coordinate and the rate of one body or of all, fastest for Python numbers."""
     is_valid = (
         type(coordinate) is float and type(rate) is float and math.isfinite(coordinate) and abs(rate) <= MAX_SPEED
     )
-    overturn_angle = np.where(records["two_stops"], np.inf, records["overturn_angle"]).min()
+    overturn_angle = np.where(structs["two_stops"], np.inf, structs["overturn_angle"]).min()
     if is_valid and abs(coordinate) < overturn_angle:
         return
     kind = bodies[0].coordinate
@@ -205,7 +205,7 @@ def conserves_speed(bodies: Bodies) -> bool:
 
 def build_settings(
     bodies: Bodies, model: Model, scheme: ChatteringScheme, duration: float | None, *, writes_tables: bool
-) -> state.Record:
+) -> state.Struct:
     """Check and return the settings of a simulation; a duration is required if nothing comes to rest."""
     checks.choice(model, "model", OptionError, MODELS)
     if duration is None:

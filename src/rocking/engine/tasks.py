@@ -32,7 +32,7 @@ from rocking.kernels import lanes, state
 from rocking.kernels.ground import Ground, Grounds, compute_max_weights, select_ground
 from rocking.kernels.lane_steps import LANE_COUNT
 from rocking.kernels.march import march
-from rocking.kernels.state import Record, Records
+from rocking.kernels.state import Struct, Structs
 from rocking.kernels.uplift import write_completeness
 from rocking.motion.motion import Motion
 
@@ -99,23 +99,23 @@ class Setup:
         check_components(bodies, motion)
         settings = build_settings(bodies, self.model, self.chattering, self.duration, writes_tables=writes_tables)
         thresholds = self.chattering.thresholds(bodies, motion, self.model, factor)
-        records = bodies.create_kernel_records(self.model, thresholds)
+        structs = bodies.create_kernel_structs(self.model, thresholds)
         if self.friction is not None:
-            add_friction(records, bodies, self.model, self.friction)
+            add_friction(structs, bodies, self.model, self.friction)
         if ground is None:
             ground = prepare_ground(motion, bodies.gravity)._replace(factor=float(factor))
         states = state.create_states(len(bodies), 0)
-        set_start(states, records, bodies, *self.start, name)
-        return KernelArguments(ground, records, settings, states)
+        set_start(states, structs, bodies, *self.start, name)
+        return KernelArguments(ground, structs, settings, states)
 
 
 class KernelArguments(NamedTuple):
-    """Bodies under a motion, as kernels accept them: the ground, a record and a state per body, and the settings."""
+    """Bodies under a motion, as kernels accept them: the ground, a struct and a state per body, and the settings."""
 
     ground: Ground
-    records: Records
-    settings: Record
-    states: Records
+    structs: Structs
+    settings: Struct
+    states: Structs
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,29 +218,29 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
     motion_indices = np.zeros(len(bodies), dtype=np.int64) if task.motion_indices is None else task.motion_indices
     factors = np.broadcast_to(np.asarray(task.factor, dtype=float), len(bodies)).copy()
     settings = build_settings(bodies, setup.model, setup.chattering, setup.duration, writes_tables=False)
-    records = bodies.create_kernel_records(
+    structs = bodies.create_kernel_structs(
         setup.model, _compute_thresholds(setup, bodies, task.motions, motion_indices, factors)
     )
     if setup.friction is not None:
-        add_friction(records, bodies, setup.model, setup.friction)
+        add_friction(structs, bodies, setup.model, setup.friction)
     states = state.create_states(len(bodies), 0)
-    set_start(states, records, bodies, *setup.start)
+    set_start(states, structs, bodies, *setup.start)
     complete = np.empty(len(bodies), dtype=bool)
     for group in prepare_grounds(task.motions, bodies.gravity):
-        for indices, substeps in _split_group(group, motion_indices, factors, records, setup.model):
+        for indices, substeps in _split_group(group, motion_indices, factors, structs, setup.model):
             if cancelled is not None and cancelled.is_set():
                 break
             index = np.searchsorted(group.indices, motion_indices[indices])
-            # `take` copies records 20 times as fast as indexing, which copies field by field.
-            batch = _Batch(group.grounds, index, factors[indices], records.take(indices), states.take(indices))
+            # `take` copies structs 20 times as fast as indexing, which copies field by field.
+            batch = _Batch(group.grounds, index, factors[indices], structs.take(indices), states.take(indices))
             piece_counts = np.diff(group.grounds.first_pieces)[index]
             batch.states["budget"] = _STEPS_OF_FIRST_SLICE + STEP_BUDGET_PER_PIECE * piece_counts
             _march_together(settings, batch, substeps)
             _resume_marches(settings, batch, cancelled)
-            state.replace_records(states, indices, batch.states)
+            state.replace_structs(states, indices, batch.states)
             complete[indices] = detect_complete_chattering(*batch)
     outcomes = _collect_outcomes(states, np.array([motion.end for motion in task.motions])[motion_indices])
-    outcomes["peak_rotation"] = compute_peaks(states, records, bodies.stops)
+    outcomes["peak_rotation"] = compute_peaks(states, structs, bodies.stops)
     is_known = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"] | outcomes["lost_contact"])
     side = states["side"]
     stop = np.where((side == 1) | (side == -2), bodies.stops[:, 1], bodies.stops[:, 0])
@@ -272,12 +272,12 @@ class _Batch(NamedTuple):
     grounds: Grounds
     motion_indices: Integers  # index of the motion of each
     factors: Floats
-    records: Records
-    states: Records
+    structs: Structs
+    states: Structs
 
 
 def _split_group(
-    group: GroundGroup, motion_indices: Integers, factors: Floats, records: Records, model: Model
+    group: GroundGroup, motion_indices: Integers, factors: Floats, structs: Structs, model: Model
 ) -> Iterator[tuple[Integers, int]]:
     """Yield simulations under a group of motions for one call of a kernel, and their number of substeps.
 
@@ -287,8 +287,8 @@ def _split_group(
     index = np.searchsorted(group.indices, motion_indices[members])
     weight = compute_max_weights(group.grounds, index, factors[members])
     step, with_vertical = group.steps[index], group.grounds.stretches.shape[1] > 1
-    width = step * np.sqrt(np.abs(records["stiffness"][members]).max(axis=1) * weight)
-    is_excluded = records["restrained"] | records["two_stops"] | (records["has_friction"] & with_vertical)
+    width = step * np.sqrt(np.abs(structs["stiffness"][members]).max(axis=1) * weight)
+    is_excluded = structs["restrained"] | structs["two_stops"] | (structs["has_friction"] & with_vertical)
     in_lanes = (step > 0.0) & (width <= lanes.MAX_STEP) & ~is_excluded[members]
     width = np.where(in_lanes, width, 0.0)
     if model == "nonlinear" or with_vertical:  # otherwise one formula covers a sample
@@ -303,21 +303,21 @@ def _split_group(
             yield indices[part], int(count)
 
 
-def _march_together(settings: Record, batch: _Batch, substeps: int) -> None:
+def _march_together(settings: Struct, batch: _Batch, substeps: int) -> None:
     """Run simulations in lanes, or one after the other if lanes do not support them."""
     count = max(substeps, 0) if settings["nonlinear"] else 0
-    pool = lanes.build_pool(*batch, float(settings["stop"]), count)
+    pool = lanes.build_pool(*batch, float(settings["stop_time"]), count)
     if substeps < 0:
         lanes.march_blocks(settings, state.create_scratch(), pool)
     else:
         lanes.run_lanes(settings, state.create_scratch(), pool, substeps)
 
 
-def _resume_marches(settings: Record, batch: _Batch, cancelled: threading.Event | None) -> None:
+def _resume_marches(settings: Struct, batch: _Batch, cancelled: threading.Event | None) -> None:
     """Continue simulations that have used up their first slice of steps, up to their budget."""
     empty_table, scratch = state.create_table(0), state.create_scratch()
-    ending = batch.states["ending"]
-    for k in np.flatnonzero((ending == state.Ending.RUNNING) | (ending == state.Ending.PAUSED)):
+    status = batch.states["status"]
+    for k in np.flatnonzero((status == state.MarchStatus.RUNNING) | (status == state.MarchStatus.PAUSED)):
         body_state = batch.states[k]
         ground = select_ground(batch.grounds, batch.motion_indices[k], float(batch.factors[k]))
         body_state["stop_piece"] = state.NO_STOP_PIECE
@@ -325,11 +325,11 @@ def _resume_marches(settings: Record, batch: _Batch, cancelled: threading.Event 
             if cancelled is not None and cancelled.is_set():
                 return
             body_state["budget"] = STEPS_PER_SLICE
-            body_state["ending"] = march(ground, batch.records[k], settings, empty_table, scratch, body_state)
-            if int(body_state["ending"]) != state.Ending.PAUSED:
+            body_state["status"] = march(ground, batch.structs[k], settings, empty_table, scratch, body_state)
+            if int(body_state["status"]) != state.MarchStatus.PAUSED:
                 break
         else:
-            body_state["ending"] = state.Ending.UNFINISHED
+            body_state["status"] = state.MarchStatus.UNFINISHED
 
 
 def count_slices(ground: Ground) -> int:
@@ -338,23 +338,23 @@ def count_slices(ground: Ground) -> int:
 
 
 def detect_complete_chattering(
-    grounds: Grounds, motion_indices: Integers, factors: Floats, records: Records, states: Records
+    grounds: Grounds, motion_indices: Integers, factors: Floats, structs: Structs, states: Structs
 ) -> Flags:
     """Whether chattering after the first uplift was complete, from the times of that uplift and the first rest."""
     complete = np.empty(len(states), dtype=bool)
-    write_completeness(grounds, motion_indices, factors, records, states, state.create_scratch(), complete)
+    write_completeness(grounds, motion_indices, factors, structs, states, state.create_scratch(), complete)
     return complete
 
 
-def _collect_outcomes(states: Records, motion_end: Floats) -> NDArray[np.void]:
+def _collect_outcomes(states: Structs, motion_end: Floats) -> NDArray[np.void]:
     outcomes = np.empty(len(states), dtype=OUTCOME_DTYPE)
-    outcomes["overturned"] = states["ending"] == state.Ending.OVERTURNED
-    outcomes["unfinished"] = states["ending"] == state.Ending.UNFINISHED
-    outcomes["leans"] = states["ending"] == state.Ending.LEANS
-    outcomes["lost_contact"] = states["ending"] == state.Ending.LOST
+    outcomes["overturned"] = states["status"] == state.MarchStatus.OVERTURNED
+    outcomes["unfinished"] = states["status"] == state.MarchStatus.UNFINISHED
+    outcomes["leans"] = states["status"] == state.MarchStatus.LEANS
+    outcomes["lost_contact"] = states["status"] == state.MarchStatus.LOST
     is_early = (states["side"] >= 0) | (states["direction"] != 0) | (states["end_time"] < motion_end)
     # A body that remains balanced also has no outcome.
-    is_undecided = (states["ending"] == state.Ending.DONE) | (states["ending"] == state.Ending.BALANCED)
+    is_undecided = (states["status"] == state.MarchStatus.DONE) | (states["status"] == state.MarchStatus.BALANCED)
     outcomes["stopped"] = is_undecided & is_early
     for name, field in (
         ("peak_rotation", "peak"), ("peak_time", "peak_time"), ("impacts", "impacts"), ("uplifts", "uplifts"),

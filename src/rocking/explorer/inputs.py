@@ -135,7 +135,7 @@ def response_to_texts(response: Response, uploads: UploadStore) -> dict[str, str
         texts["chattering"] = str(response.chattering)
     settings = response.solution.trail.settings
     if not settings["no_end_time"]:
-        texts["duration"] = repr(float(settings["stop"]))
+        texts["duration"] = repr(float(settings["stop_time"]))
     rotation, velocity = float(response.rotation(0.0)), float(response.angular_velocity(0.0))
     if rotation or velocity:
         texts |= {"initial_rotation": repr(rotation), "initial_velocity": repr(velocity)}

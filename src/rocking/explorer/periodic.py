@@ -118,7 +118,7 @@ def describe_orbit(case: Case) -> Payload:
     if period > 0:
         orbit = create_orbit(strobe, states[-1], period)
         course = sample_interval(orbit.response, 0.0, orbit.response.duration)
-        states, sentence = orbit.states, f"{orbit._headline().capitalize()}."
+        states, sentence = orbit.states, f"{orbit._format_headline().capitalize()}."
         arrays = {"rotation": course.rotation, "velocity": course.velocity, "jump": course.impact_rows.astype(float)}
     else:
         words = {OVERTURNED: "The block overturns", NOT_FOLLOWED: "The block requires too many steps"}
@@ -164,7 +164,7 @@ def simulate_sweep(sweep: Sweep) -> Generator[Payload]:
         share += 8.0 / stride / 15.0
         states = np.stack([data.coordinate.values, data.velocity.values], axis=-1)
         for d, direction in enumerate(data.direction.values.tolist()):
-            periods, impacts = data.period.values[d].tolist(), data.impacts.values[d].tolist()
+            periods, impacts = data.period.values[d].tolist(), data.impact_count.values[d].tolist()
             counts = [0 if period < 0 else period or RECORDED_PERIODS for period in periods]
             kept = np.concatenate([states[d, k, RECORDED_PERIODS - count :] for k, count in enumerate(counts)])
             header = {

@@ -159,7 +159,7 @@ def describe_computation(names: Sequence[str] = RECORDS) -> dict[str, Any]:
             )
         },
         "templates": _build_templates(),
-        "endings": _list_codes(state.Ending),
+        "statuses": _list_codes(state.MarchStatus),
         "events": _list_codes(state.EventKind),
         "ground": {"first": sample.first, "stretch": ground.PIECES_PER_STRETCH, "unit": sample.unit},
         "budget": {"slice": STEPS_PER_SLICE, "total": STEP_BUDGET, "per_piece": STEP_BUDGET_PER_PIECE},
@@ -221,15 +221,15 @@ def _build_templates() -> dict[str, str]:
         run = Setup(Block(width=0.4, height=2.0).as_bodies(), model, scheme).prepare(None, writes_tables=is_recorded)
         key = f"{model} {scheme.name}"
         templates[f"settings {key} {'record' if is_recorded else 'state'}"] = _write_bytes(run.settings)
-        templates[f"block {key}"] = _write_bytes(run.records)
+        templates[f"block {key}"] = _write_bytes(run.structs)
     return templates
 
 
-def _write_bytes(record: state.Record) -> str:
-    """Write the bytes of a record, with zeros between its fields."""
-    copied = np.zeros(1, record.dtype)
-    for name in record.dtype.names:
-        copied[name] = record[name]
+def _write_bytes(struct: state.Struct) -> str:
+    """Write the bytes of a struct, with zeros between its fields."""
+    copied = np.zeros(1, struct.dtype)
+    for name in struct.dtype.names:
+        copied[name] = struct[name]
     return copied.tobytes().hex()
 
 

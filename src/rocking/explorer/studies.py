@@ -49,7 +49,7 @@ class StudyView:
 
     def __init__(self, folder: Path) -> None:
         self.name, self.study = folder.name, rocking.Study(folder)
-        if not self.study.status.done:
+        if not self.study.status.done_count:
             raise StudyError(f"nothing of the study in {folder} is done yet: rocking study run {folder}")
         product = self.study.product
         blocks, scales = product.blocks, np.asarray(product.scales.values, dtype=float)

@@ -54,7 +54,7 @@ class Input:
     unit, default, low, high, logarithmic, step : str, str, float, float, bool, float
         Field of the page: displayed unit, initial text, limits of the slider in that unit, whether the slider is
         logarithmic, and its step if not a thousandth of its range.
-    value_count : str
+    arity : str
         Number of values: "two" for one of each side of a block, "one or two" if they may differ.
     text : str
         Suffix of the texts ``field.TEXT`` and ``about.TEXT`` of the page; by default the name.
@@ -71,7 +71,7 @@ class Input:
     low: float = 0.0
     high: float = 0.0
     logarithmic: bool = False
-    value_count: Literal["one", "one or two", "two"] = "one"
+    arity: Literal["one", "one or two", "two"] = "one"
     step: float = 0.0
     text: str = ""
     argument: str = ""
@@ -89,12 +89,12 @@ class Input:
         if self.kind not in READERS:
             return text
         reader = READERS[self.kind][0]
-        if self.value_count == "one":
+        if self.arity == "one":
             return reader(text, self.name)
         numbers = quantities.read_sides(text, self.name, reader)
         if isinstance(numbers, list):
             return tuple(numbers)
-        return (numbers, numbers) if self.value_count == "two" else numbers
+        return (numbers, numbers) if self.arity == "two" else numbers
 
     def read_uncertain(self, text: str) -> Any:
         """Return the value of a text, as `read`, or a distribution from "0.30 +- 0.02" (mean, standard deviation)."""
@@ -107,7 +107,7 @@ class Input:
         if self.kind not in READERS:
             return [value]
         reader = READERS[self.kind][0]
-        if self.value_count != "two":
+        if self.arity != "two":
             return [*map(float, quantities.read_axis(value, self.name, reader))]
         pairs = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
         pairs_read = [tuple(map(float, quantities.read_axis(pair, self.name, reader))) for pair in pairs]
@@ -118,7 +118,7 @@ class Input:
 
     def describe(self) -> dict[str, Any]:
         """Return the properties that the page requires, in plain values."""
-        names = ("name", "group", "unit", "default", "low", "high", "logarithmic", "value_count", "step")
+        names = ("name", "group", "unit", "default", "low", "high", "logarithmic", "arity", "step")
         plain = {name: getattr(self, name) for name in names}
         kind = "angle" if self.kind == "tilt" else self.kind
         return {
@@ -225,7 +225,7 @@ INPUTS: Final = index_by_name(
         default="nonlinear"),
     Input("friction", "model", "number",
         "Coefficient of friction with which slip is simulated, or the static and the kinetic one, as 0.3,0.25.",
-        "", "0.5", 0.05, 1.5, value_count="one or two"),
+        "", "0.5", 0.05, 1.5, arity="one or two"),
     Input("chattering", "treatment", "text",
         "How chattering ends: certified, velocity, bypass, interval, or (under a sine) time; with a limit, as "
         "certified=1e-9 (s), velocity=5e-10 or bypass=1e-3 (over p alpha), interval=1e-9 (s).", default="certified"),

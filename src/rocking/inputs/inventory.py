@@ -303,7 +303,7 @@ def _read_row(headings: Sequence[_Heading], cells: Sequence[str]) -> dict[str, A
 
 def _add_unit(text: str, heading: _Heading) -> str:
     """Add the unit of the heading to each number without a unit, and replace a decimal comma."""
-    if INPUTS[heading.input].value_count == "one" and heading.input not in FORCE_RESTRAINTS:
+    if INPUTS[heading.input].arity == "one" and heading.input not in FORCE_RESTRAINTS:
         text = re.sub(r"(?<![\d,])(\d+),(\d+)(?![\d,])", r"\1.\2", text)
     if not heading.unit:
         return text

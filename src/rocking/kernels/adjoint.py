@@ -17,7 +17,7 @@ from rocking.kernels.events import compute_mean_factor
 from rocking.kernels.ground import ground_error, has_vertical, select_vertical, sum_absolute_terms
 from rocking.kernels.restraints import apply_tendon_law, update_plastic_elongation
 from rocking.kernels.series import write_variation_coefficients
-from rocking.kernels.state import Record, Records, TendonLaw
+from rocking.kernels.state import Struct, Structs, TendonLaw
 from rocking.kernels.trace import (
     Quantity,
     Trail,
@@ -56,7 +56,7 @@ class AdjointEnd(IntEnum):
 
 @kernel
 def adjoint(
-    trail: Trail, scratch: Record, variation: Record, row: int, time: float, change: Floats, out: Floats
+    trail: Trail, scratch: Struct, variation: Struct, row: int, time: float, change: Floats, out: Floats
 ) -> int:
     """Propagate ``change``, the derivatives of a number, back to the start of the response; return the `AdjointEnd`.
 
@@ -97,7 +97,7 @@ def adjoint(
 
 
 @inlined
-def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, change: Floats) -> None:
+def add_rounding(trail: Trail, scratch: Struct, k: int, order: int, t: float, change: Floats) -> None:
     """Add a bound on the effect of rounding during a time t of the arc from the k-th node to ``change[3]``.
 
     ``change[4]`` becomes the largest relative rate of decrease of a speed just before its impact.
@@ -124,7 +124,7 @@ def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, ch
 
 
 @inlined
-def propagate_through_rest(nodes: Records, k: int, change: Floats) -> int:
+def propagate_through_rest(nodes: Structs, k: int, change: Floats) -> int:
     """Propagate ``change`` back through a rest at the node or the one before; CONTINUES if a derivative remains.
 
     Impacts between the last resolved one and the rest have no effect.
@@ -160,7 +160,7 @@ def propagate_through_impact(trail: Trail, k: int, v: float, number: int, change
 
 
 @kernel
-def differentiate_step_end(trail: Trail, scratch: Record, row: int, change: Floats, out: Floats) -> int:
+def differentiate_step_end(trail: Trail, scratch: Struct, row: int, change: Floats, out: Floats) -> int:
     """Write the derivative of the time at which the step of a row ends by the state before it; return the `AdjointEnd`.
 
     That state is at the end of the step, before an impact or an overturning, otherwise at its node. For an uplift or
@@ -197,7 +197,7 @@ def differentiate_step_end(trail: Trail, scratch: Record, row: int, change: Floa
 
 
 @inlined
-def differentiate_rest_time(trail: Trail, node: Record, plastic_elongation: float, change: Floats, out: Floats) -> None:
+def differentiate_rest_time(trail: Trail, node: Struct, plastic_elongation: float, change: Floats, out: Floats) -> None:
     """Write the derivatives of the time of rest after the impact of a node (see `trace.compute_rest_shift`)."""
     block, i = trail.block, node.side
     j = block.next_side[i]
@@ -219,7 +219,7 @@ def differentiate_rest_time(trail: Trail, node: Record, plastic_elongation: floa
 
 
 @inlined
-def add_instant(trail: Trail, node: Record, derivatives: tuple[float, float], out: Floats) -> None:
+def add_instant(trail: Trail, node: Struct, derivatives: tuple[float, float], out: Floats) -> None:
     """Add the derivatives by the coefficients of a node's piece from ``derivatives`` by push and weight at the node."""
     columns = trail.ground.columns
     push, weight = derivatives
@@ -232,7 +232,7 @@ def add_instant(trail: Trail, node: Record, derivatives: tuple[float, float], ou
 
 
 @inlined
-def is_plastic_end(nodes: Records, row: int) -> bool:
+def is_plastic_end(nodes: Structs, row: int) -> bool:
     """Return whether the body turns back at a node, where the plastic elongation is written."""
     return bool(nodes[row - 1].tendon_law == TendonLaw.PLASTIC and nodes[row].tendon_law == TendonLaw.ELASTIC)
 
@@ -248,7 +248,7 @@ def find_plastic_elongation(trail: Trail, row: int) -> float:
 
 
 @inlined
-def count_impacts(nodes: Records, row: int) -> int:
+def count_impacts(nodes: Structs, row: int) -> int:
     """Count the impacts up to the node of a row."""
     count = 0
     for k in range(row):
@@ -259,9 +259,9 @@ def count_impacts(nodes: Records, row: int) -> int:
 @not_inlined
 def propagate_through_arc(
     trail: Trail,
-    scratch: Record,
-    variation: Record,
-    node: Record,
+    scratch: Struct,
+    variation: Struct,
+    node: Struct,
     orders: tuple[int, int],
     t: float,
     change: Floats,
@@ -305,7 +305,7 @@ def propagate_through_arc(
 
 
 @inlined
-def write_plastic_series(trail: Trail, scratch: Record, side: int, x: Floats, order: int, m: Floats) -> None:
+def write_plastic_series(trail: Trail, scratch: Struct, side: int, x: Floats, order: int, m: Floats) -> None:
     """Write x times d u'' / d plastic into m."""
     stiffness = trail.block.tendon_stiffness[side]
     for k in range(order - 1):

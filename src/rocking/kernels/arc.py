@@ -17,7 +17,7 @@ from rocking.kernels.series import (
     write_half_angle_coefficients,
     write_linear_coefficients,
 )
-from rocking.kernels.state import ORDER, Record
+from rocking.kernels.state import ORDER, Struct
 
 #: First step after an impact, divided by the arc's duration under constant acceleration.
 _FIRST_STEP = 1.3
@@ -30,7 +30,7 @@ def side_sign(side: int) -> float:
 
 
 @inlined
-def compute_restoring(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
+def compute_restoring(ground: Ground, block: Struct, side: int, piece: int, offset: float) -> float:
     """Compute the restoring acceleration of a side at zero rotation."""
     threshold = block.threshold[side] * compute_weight(ground, piece, offset) + block.restraint_threshold[side]
     return block.restoring_gain[side] * (threshold + side_sign(side) * compute_acceleration(ground, piece, offset))
@@ -53,7 +53,7 @@ def write_weight_series(ground: Ground, piece: int, offset: float, W: Floats) ->
 
 @not_inlined
 def expand_arc(
-    ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h_max: float
+    ground: Ground, block: Struct, settings: Struct, scratch: Struct, state: Struct, h_max: float
 ) -> tuple[int, float, int]:
     """Write the series of the arc from a state into scratch; return (order, step, degree of both components).
 
@@ -91,7 +91,7 @@ def pad_to_same_degree(A: Floats, degree: int, W: Floats, weight_degree: int) ->
 
 
 @inlined
-def find_step_length(ground: Ground, block: Record, state: Record, h_max: float) -> float:
+def find_step_length(ground: Ground, block: Struct, state: Struct, h_max: float) -> float:
     """Compute the length of the next Taylor step."""
     h = min(h_max, 1.0 / np.sqrt(abs(block.stiffness[state.side])))
     if block.restrained:
@@ -104,7 +104,7 @@ def find_step_length(ground: Ground, block: Record, state: Record, h_max: float)
 
 
 @inlined
-def limit_restrained_step(block: Record, side: int) -> float:
+def limit_restrained_step(block: Struct, side: int) -> float:
     """Return the longest step: the inverse of the largest rate of motion or damping under restraints."""
     stiffness = abs(block.stiffness[side]) * (1.0 + abs(block.added_weight[side])) + abs(block.spring[side])
     max_rate = max(math.sqrt(stiffness), block.damping[side])
@@ -155,7 +155,7 @@ def find_converged_order(c: Floats, degree: int, h: float) -> int:
 
 @not_inlined
 def expand_with_bound(
-    block: Record, settings: Record, state: Record, scratch: Record, degrees: tuple[int, int], h: float
+    block: Struct, settings: Struct, state: Struct, scratch: Struct, degrees: tuple[int, int], h: float
 ) -> tuple[int, float]:
     """Compute the series of an arc and of its sines and cosines, for the degrees of motion and weight.
 
@@ -210,7 +210,7 @@ MAX_SHORTENINGS = 200
 
 @not_inlined
 def shorten_step(
-    block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], h: float
+    block: Struct, settings: Struct, side: int, scratch: Struct, degrees: tuple[int, int], h: float
 ) -> float:
     """Return a step, at most h, within which the truncation of a full series is negligible."""
     for _ in range(MAX_SHORTENINGS):
@@ -224,7 +224,7 @@ def shorten_step(
 
 @inlined
 def bound_truncation(
-    block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], order: int, h: float
+    block: Struct, settings: Struct, side: int, scratch: Struct, degrees: tuple[int, int], order: int, h: float
 ) -> tuple[float, float]:
     """Bound the truncation of an arc's velocity within h, and return its largest term, both times h.
 
@@ -239,7 +239,7 @@ def bound_truncation(
 
 @not_inlined
 def bound_linear_truncation(
-    scratch: Record, lam: float, weight_degree: int, order: int, h: float
+    scratch: Struct, lam: float, weight_degree: int, order: int, h: float
 ) -> tuple[float, float]:
     """Bound the truncation of a linear arc, for a weight of degree ``weight_degree``.
 
@@ -268,7 +268,7 @@ def bound_linear_truncation(
 
 @not_inlined
 def bound_nonlinear_truncation(
-    scratch: Record, lam: float, degrees: tuple[int, int], order: int, h: float
+    scratch: Struct, lam: float, degrees: tuple[int, int], order: int, h: float
 ) -> tuple[float, float]:
     """Bound the truncation of a nonlinear arc.
 
@@ -309,7 +309,7 @@ def bound_nonlinear_truncation(
 
 @not_inlined
 def bound_restrained_truncation(
-    block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], order: int, h: float
+    block: Struct, settings: Struct, side: int, scratch: Struct, degrees: tuple[int, int], order: int, h: float
 ) -> tuple[float, float]:
     """Bound the truncation of an arc of a restrained body.
 
@@ -350,7 +350,7 @@ def bound_restrained_truncation(
 
 @inlined
 def bound_restrained_angles(
-    scratch: Record, degrees: tuple[int, int], order: int, h: float, force_terms: tuple[float, float, float, float]
+    scratch: Struct, degrees: tuple[int, int], order: int, h: float, force_terms: tuple[float, float, float, float]
 ) -> float:
     """Bound V of `bound_restrained_truncation` in the nonlinear model from terms of the rotation in ``auxiliary``.
 

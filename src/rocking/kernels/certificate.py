@@ -39,7 +39,7 @@ from rocking.kernels.sliding import (
     compute_slip_stiffness,
     find_sticking_friction,
 )
-from rocking.kernels.state import Record
+from rocking.kernels.state import Struct
 
 #: Window of the proof divided by the first estimate of the remaining time.
 _WINDOW_RATIO = 1.5
@@ -131,7 +131,7 @@ def create_failed_proof() -> Proof:
 
 
 @not_inlined
-def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> Proof:
+def prove_rest(ground: Ground, block: Struct, settings: Struct, scratch: Struct, state: Struct) -> Proof:
     """Compute a bracket on the time to rest after an impact; all NaN: no proof."""
     v, i = state.v, state.side
     j = block.next_side[i]
@@ -197,7 +197,7 @@ class MotionBounds(NamedTuple):
 
 @inlined
 def sticks_until_rest(
-    block: Record, settings: Record, motion: MotionBounds, height: float, max_squared_speed: float
+    block: Struct, settings: Struct, motion: MotionBounds, height: float, max_squared_speed: float
 ) -> bool:
     """Return whether no arc and no impact of a proven sequence slips (Eqs 7 and 10 of "Sliding"); False for NaN.
 
@@ -231,7 +231,7 @@ _MAX_SLIDING_SPEED_RATIO = 1.25
 
 
 @not_inlined
-def prove_slide(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> Proof:
+def prove_slide(ground: Ground, block: Struct, settings: Struct, scratch: Struct, state: Struct) -> Proof:
     """Compute a bracket on the time at which a block that slips ceases to rock and slides; all NaN: no proof.
 
     The restoring acceleration does not depend on the horizontal motion (Eq. 11 of "Sliding"), and an impact multiplies
@@ -282,7 +282,7 @@ def prove_slide(ground: Ground, block: Record, settings: Record, scratch: Record
 
 
 @inlined
-def compute_sliding_divisor(block: Record, side: int, direction: float, height: float) -> float:
+def compute_sliding_divisor(block: Struct, side: int, direction: float, height: float) -> float:
     """Return a lower bound on the divisor of the normal force on a side up to a height."""
     lever = block.sine[side] - direction * block.kinetic_friction * block.cosine[side]
     slope = block.inertia_ratio[side] * compute_norm(1.0, block.kinetic_friction)
@@ -291,8 +291,8 @@ def compute_sliding_divisor(block: Record, side: int, direction: float, height: 
 
 @inlined
 def bound_sliding_side(
-    block: Record,
-    settings: Record,
+    block: Struct,
+    settings: Struct,
     side: int,
     slip: tuple[float, float],
     vertical: AccelerationBounds,
@@ -326,7 +326,7 @@ def bound_sliding_side(
 
 
 @inlined
-def bound_motion(ground: Ground, block: Record, state: Record, window: float, scratch: Record) -> MotionBounds:
+def bound_motion(ground: Ground, block: Struct, state: Struct, window: float, scratch: Struct) -> MotionBounds:
     """Bound the motion from a state on, including its error; NaN beyond a threshold."""
     vertical = AccelerationBounds(0.0, 0.0, 0.0, 0.0)
     if has_vertical(ground):
@@ -368,7 +368,7 @@ def widen_for_drag(bounds: RestoringBounds, drag: float) -> RestoringBounds:
 
 
 @inlined
-def fit_restoring_parabola(block: Record, settings: Record, j: int, scratch: Record, horizon: Horizon) -> ImpactSide:
+def fit_restoring_parabola(block: Struct, settings: Struct, j: int, scratch: Struct, horizon: Horizon) -> ImpactSide:
     """Compute side j after an impact: restoring acceleration as a parabola in time, stiffness, and error.
 
     ``scratch`` contains the ground acceleration and the weight about the impact.
@@ -440,13 +440,13 @@ def bound_weight_magnitude(vertical: AccelerationBounds) -> float:
 
 
 @inlined
-def bound_weight(block: Record, j: int, vertical: AccelerationBounds) -> float:
+def bound_weight(block: Struct, j: int, vertical: AccelerationBounds) -> float:
     """Return the largest absolute weight on side j, including restraints."""
     return bound_weight_magnitude(vertical) + abs(block.added_weight[j])
 
 
 @inlined
-def bound_push(block: Record, j: int, horizontal: AccelerationBounds) -> float:
+def bound_push(block: Struct, j: int, horizontal: AccelerationBounds) -> float:
     """Return the largest absolute push on side j, including restraints."""
     return bound_magnitude(horizontal) + abs(block.added_push[j])
 
@@ -458,7 +458,7 @@ def compute_norm(a: float, b: float) -> float:
 
 
 @inlined
-def bound_side(block: Record, settings: Record, j: int, motion: MotionBounds) -> RestoringBounds:
+def bound_side(block: Struct, settings: Struct, j: int, motion: MotionBounds) -> RestoringBounds:
     """Compute bounds on side j, rounding included, from bounds on the motion."""
     horizontal, vertical = motion
     sign, threshold = side_sign(j), block.threshold[j]

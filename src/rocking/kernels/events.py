@@ -12,7 +12,7 @@ from rocking.core.arrays import Floats
 from rocking.kernels.arc import evaluate_series
 from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.ground import ROUNDING, shift_polynomial
-from rocking.kernels.state import Record, StepOutcome
+from rocking.kernels.state import StepOutcome, Struct
 
 _EPSILON = 2.0**-53
 
@@ -154,7 +154,7 @@ class StepEnd(NamedTuple):
 
 
 @not_inlined
-def advance_to_event(state: Record, scratch: Record, order: int, h: float, overturn_angle: float) -> StepEnd:
+def advance_to_event(state: Struct, scratch: Struct, order: int, h: float, overturn_angle: float) -> StepEnd:
     """Follow the series of an arc to its first event within h; the outcome is STEP, IMPACT or OVERTURN."""
     c, d = scratch.rotation, scratch.auxiliary
     lead = 0 if state.u > 0.0 else (1 if state.v > 0.0 else 2)
@@ -179,7 +179,7 @@ def advance_to_event(state: Record, scratch: Record, order: int, h: float, overt
 
 
 @inlined
-def raise_peak(state: Record, peak: float, time: float) -> None:
+def raise_peak(state: Struct, peak: float, time: float) -> None:
     """Store a new largest rotation, with the time of the first of maxima that differ only by rounding.
 
     A step from the largest rotation so far continues the same rise.
@@ -190,7 +190,7 @@ def raise_peak(state: Record, peak: float, time: float) -> None:
 
 
 @inlined
-def may_exceed_peak(state: Record, end: float, c: Floats, order: int, h: float) -> bool:
+def may_exceed_peak(state: Struct, end: float, c: Floats, order: int, h: float) -> bool:
     """Return whether a series may exceed, within (0, h), its values at both ends and the largest rotation so far."""
     curvature = bound_curvature(c, 0, order, h)
     if max(state.u, end) + 0.125 * h * h * curvature <= state.peak:
@@ -248,7 +248,7 @@ def find_first_passage(c: Floats, order: int, level: float, h: float, d: Floats)
 
 
 @inlined
-def apply_impact(block: Record, state: Record) -> float:
+def apply_impact(block: Struct, state: Struct) -> float:
     """Reduce the angular speed and change the side at an impact; return the earlier speed."""
     departed_side = state.side
     speed = max(0.0, -state.v)
@@ -275,7 +275,7 @@ _WORD = 0xFFFFFFFF
 
 
 @inlined
-def compute_restitution_factor(block: Record, side: int, speed: float, number: int) -> float:
+def compute_restitution_factor(block: Struct, side: int, speed: float, number: int) -> float:
     """Return the factor on the speed of an impact that leaves a side, after ``number`` others."""
     if block.variable_restitution:
         return compute_variable_factor(block, side, speed, number)
@@ -283,7 +283,7 @@ def compute_restitution_factor(block: Record, side: int, speed: float, number: i
 
 
 @not_inlined
-def compute_variable_factor(block: Record, side: int, speed: float, number: int) -> float:
+def compute_variable_factor(block: Struct, side: int, speed: float, number: int) -> float:
     """Compute a variable factor; see `compute_restitution_factor`."""
     lowest, highest = block.min_restitution[side], block.restitution[side]
     if is_factor_random(block):
@@ -292,13 +292,13 @@ def compute_variable_factor(block: Record, side: int, speed: float, number: int)
 
 
 @inlined
-def is_factor_random(block: Record) -> bool:
+def is_factor_random(block: Struct) -> bool:
     """Return whether the factor is drawn at each impact."""
     return bool(block.variable_restitution and block.seed >= 0)
 
 
 @inlined
-def compute_speed_slope(block: Record, side: int, speed: float, e: float) -> float:
+def compute_speed_slope(block: Struct, side: int, speed: float, e: float) -> float:
     """Compute d(speed after)/d(speed before) of an impact, divided by the factor e (1 if the factor is constant)."""
     if block.variable_restitution and block.seed < 0 and e > block.min_restitution[side]:
         return 1.0 - block.restitution_slope[side] * speed / e
@@ -306,7 +306,7 @@ def compute_speed_slope(block: Record, side: int, speed: float, e: float) -> flo
 
 
 @inlined
-def bound_factor(block: Record, side: int, max_speed: float) -> float:
+def bound_factor(block: Struct, side: int, max_speed: float) -> float:
     """Return the smallest factor up to a speed; the largest is ``block.restitution``."""
     if not block.variable_restitution:
         return float(block.restitution[side])
@@ -316,7 +316,7 @@ def bound_factor(block: Record, side: int, max_speed: float) -> float:
 
 
 @inlined
-def compute_mean_factor(block: Record, side: int, max_speed: float) -> float:
+def compute_mean_factor(block: Struct, side: int, max_speed: float) -> float:
     """Return the midpoint of all factors up to a speed."""
     return 0.5 * (bound_factor(block, side, max_speed) + block.restitution[side])
 

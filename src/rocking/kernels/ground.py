@@ -184,7 +184,7 @@ def ground_error(ground: Ground) -> float:
 
 @inlined
 def is_piecewise_linear(ground: Ground) -> bool:
-    """Return whether the motion is linear in time on each piece, as records are."""
+    """Return whether the motion is linear in time on each piece, as structs are."""
     return ground.columns == 2
 
 

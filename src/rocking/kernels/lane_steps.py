@@ -12,7 +12,7 @@ from rocking.kernels.series import (
     has_negligible_truncation,
     sum_forcing,
 )
-from rocking.kernels.state import Record, define_record
+from rocking.kernels.state import Struct, define_struct
 
 #: Number of lanes that step together, a constant so that their loops have a fixed length.
 LANE_COUNT = 32
@@ -27,7 +27,7 @@ _SIDES = ("f8", (2,))
 #: and cos(alpha - u) before and after the step; constants of the present side (`STEP_CONSTANTS_DTYPE`); largest
 #: rotation; rotation of overturning; usual length of a sample; factor on the motion; with friction, the largest push
 #: without a slip at zero velocity and its decrease per squared velocity (`sliding.may_slip`).
-GROUP_DTYPE = define_record(
+GROUP_DTYPE = define_struct(
     **dict.fromkeys(
         ("simulation", "row", "end_row", "increment", "has_event", "has_substep_event", "is_truncated", "is_pending"),
         ("i8", (LANE_COUNT,)),
@@ -47,7 +47,7 @@ GROUP_DTYPE = define_record(
 #: c1, h^2 c2, h^3 c3 with Stumpff's functions c_k of lam h^2. Nonlinear: -lam h^2/2 instead of lam, sign of the side
 #: instead of its gain. ``curvature_factor`` max |u''| bounds the distance of the rotation above or below both ends of
 #: the step.
-STEP_CONSTANTS_DTYPE = define_record(
+STEP_CONSTANTS_DTYPE = define_struct(
     **dict.fromkeys(
         ("stiffness", "pull", "push_gain", "stumpff_1", "stumpff_2", "stumpff_3", "curvature_factor"), _SIDES
     )
@@ -58,14 +58,14 @@ _MAX_NEXT_RATIO = 2.0**-46
 
 
 @inlined
-def compute_push_line(group: Record, lane: int, unit: float) -> ValueAndSlope:
+def compute_push_line(group: Struct, lane: int, unit: float) -> ValueAndSlope:
     """Return the ground acceleration at the start of a sample and its slope, g, rounded as `ground.coefficient`."""
     factor = group.factor[lane]
     return (group.push_start[lane] * factor) * unit, (group.push_slope[lane] * factor) * unit
 
 
 @inlined
-def compute_weight_line(group: Record, lane: int, unit: float) -> ValueAndSlope:
+def compute_weight_line(group: Struct, lane: int, unit: float) -> ValueAndSlope:
     """Return the weight at the start of a sample, divided by the weight at rest, and its slope."""
     factor = abs(group.factor[lane])
     return 1.0 + (group.vertical_start[lane] * factor) * unit, (group.vertical_slope[lane] * factor) * unit
@@ -73,7 +73,7 @@ def compute_weight_line(group: Record, lane: int, unit: float) -> ValueAndSlope:
 
 @inlined
 def is_event_free(
-    group: Record, lane: int, ends: tuple[float, float], rate: float, rate_changes: tuple[float, float]
+    group: Struct, lane: int, ends: tuple[float, float], rate: float, rate_changes: tuple[float, float]
 ) -> bool:
     """Return whether a step certainly contains no impact, new peak or overturning; False for NaN.
 
@@ -93,7 +93,7 @@ def is_event_free(
 
 
 @not_inlined
-def step_linear(group: Record, unit: float) -> int:
+def step_linear(group: Struct, unit: float) -> int:
     """Step a group through one sample by Stumpff's functions (exact for any lam and h); return the number of events.
 
     Because w = u'' then satisfies w'' = lam w, its extrema are at the ends of the step (except for
@@ -132,14 +132,14 @@ def step_linear(group: Record, unit: float) -> int:
 
 
 @inlined
-def begin_step(group: Record) -> None:
+def begin_step(group: Struct) -> None:
     """Declare the step of every lane as still to be taken."""
     for lane in range(LANE_COUNT):
         group.has_event[lane] = group.is_pending[lane] = 1
 
 
 @inlined
-def copy_states(group: Record, substeps: int, scaled: bool) -> None:
+def copy_states(group: Struct, substeps: int, scaled: bool) -> None:
     """Copy the state of all lanes; if ``scaled``, with the velocity per substep."""
     for lane in range(LANE_COUNT):
         group.next_u[lane] = group.u[lane]
@@ -150,7 +150,7 @@ def copy_states(group: Record, substeps: int, scaled: bool) -> None:
 
 
 @inlined
-def accept_states(group: Record, substeps: int, scaled: bool) -> tuple[int, int]:
+def accept_states(group: Struct, substeps: int, scaled: bool) -> tuple[int, int]:
     """Copy the new states of lanes without an event; return the numbers of other lanes, and of those to be repeated."""
     events = retries = 0
     for lane in range(LANE_COUNT):
@@ -169,7 +169,7 @@ def accept_states(group: Record, substeps: int, scaled: bool) -> tuple[int, int]
 
 
 @not_inlined
-def step_weighted(group: Record, unit: float, substeps: int) -> int:
+def step_weighted(group: Struct, unit: float, substeps: int) -> int:
     """Step a group of the linear model through one sample under varying weight; return the number of events."""
     begin_step(group)
     copy_states(group, substeps, scaled=False)
@@ -179,7 +179,7 @@ def step_weighted(group: Record, unit: float, substeps: int) -> int:
 
 
 @not_inlined
-def take_weighted_substep(group: Record, unit: float, k: int, substeps: int) -> None:
+def take_weighted_substep(group: Struct, unit: float, k: int, substeps: int) -> None:
     """Move the copies through the k-th substep and mark the lanes in which an event may occur.
 
     With z = h^2 (lam u - pull), r' = weight z - h^2 push. A term contributes to the second next and, as the weight
@@ -222,7 +222,7 @@ def shift_line(line: ValueAndSlope, k: int, h: float) -> ValueAndSlope:
 
 @inlined
 def shift_weight(
-    group: Record, lane: int, resting_weight: ValueAndSlope | None, unit: float, k: int, h: float
+    group: Struct, lane: int, resting_weight: ValueAndSlope | None, unit: float, k: int, h: float
 ) -> ValueAndSlope | None:
     """Return the weight at the start of the k-th substep of length h, and its change; None if it is constant."""
     if resting_weight is None:
@@ -231,7 +231,7 @@ def shift_weight(
 
 
 @not_inlined
-def step_nonlinear(group: Record, resting_weight: ValueAndSlope | None, unit: float, substeps: int) -> int:
+def step_nonlinear(group: Struct, resting_weight: ValueAndSlope | None, unit: float, substeps: int) -> int:
     """Step a group of the nonlinear model through one sample and return the number of events.
 
     ``resting_weight`` is (1, 0), the weight without vertical motion and its slope, or None if it is constant. A lane
@@ -251,7 +251,7 @@ def step_nonlinear(group: Record, resting_weight: ValueAndSlope | None, unit: fl
 
 @not_inlined
 def take_nonlinear_substep(
-    group: Record, resting_weight: ValueAndSlope | None, unit: float, k: int, count: int, fraction: float
+    group: Struct, resting_weight: ValueAndSlope | None, unit: float, k: int, count: int, fraction: float
 ) -> None:
     """Move the copies through the k-th of ``count`` substeps, and mark lanes with possible events or truncation.
 

@@ -1,4 +1,4 @@
-"""Simulation of many blocks under evenly sampled records: together, or one by one where an event may occur.
+"""Simulation of many blocks under evenly sampled structs: together, or one by one where an event may occur.
 
 A lane contains one simulation: a block, a motion, and the factor on it. Each lane is at its own sample of its own
 motion, and starts another simulation when one ends. All lanes step through their samples together, in loops that
@@ -29,13 +29,13 @@ from rocking.kernels.lane_steps import (
 from rocking.kernels.march import march
 from rocking.kernels.state import (
     NO_STOP_PIECE,
-    Ending,
-    Record,
-    Records,
-    create_record,
-    create_records,
+    MarchStatus,
+    Struct,
+    Structs,
+    create_struct,
+    create_structs,
     create_table,
-    define_record,
+    define_struct,
     expose_fields,
 )
 
@@ -49,7 +49,7 @@ MAX_WEIGHTED_SUBSTEP = 0.125
 EMPTY_ROTATION = 1e-300
 
 #: Numbers of lanes in use and of simulations that have started.
-COUNTS_DTYPE = define_record(active="i8", started="i8")
+COUNTS_DTYPE = define_struct(active="i8", started="i8")
 
 
 class SimulationPool(NamedTuple):
@@ -58,38 +58,38 @@ class SimulationPool(NamedTuple):
     grounds: Grounds  # motions
     motion_indices: Integers  # index of the motion of each simulation
     factors: Floats  # factor on it
-    blocks: Records  # body of each
-    states: Records  # state of each
-    step_constants: Records  # step constants of each
+    blocks: Structs  # body of each
+    states: Structs  # state of each
+    step_constants: Structs  # step constants of each
     end_pieces: Integers  # first piece of each motion that lanes do not step
-    groups: Records  # one group of lanes
-    counts: Record  # `COUNTS_DTYPE`
-    table: Records  # table without rows
+    groups: Structs  # one group of lanes
+    counts: Struct  # `COUNTS_DTYPE`
+    table: Structs  # table without rows
 
 
 def build_pool(
-    grounds: Grounds, motions: Integers, factors: Floats, blocks: Records, states: Records, stop: float, substeps: int
+    grounds: Grounds, motions: Integers, factors: Floats, blocks: Structs, states: Structs, stop: float, substeps: int
 ) -> SimulationPool:
     """Return a pool of simulations up to a stop; ``substeps`` is 0 in the linear model under constant weight."""
     first, last = grounds.first_pieces[:-1], grounds.first_pieces[1:] - 1
     breakpoints = (grounds.pieces[start + 1 : end + 1, START] for start, end in zip(first, last, strict=True))
     ends = np.array([np.searchsorted(times, stop, "right") for times in breakpoints], dtype=np.int64)
     steps = compute_step_constants(blocks, grounds.pieces[first, LENGTH][motions], substeps)
-    groups, counts = _allocate_aligned(1, GROUP_DTYPE), create_record(COUNTS_DTYPE, active=LANE_COUNT)
+    groups, counts = _allocate_aligned(1, GROUP_DTYPE), create_struct(COUNTS_DTYPE, active=LANE_COUNT)
     return SimulationPool(grounds, motions, factors, blocks, states, steps, ends, groups, counts, create_table(0))
 
 
-def _allocate_aligned(count: int, kind: np.dtype[np.void]) -> Records:
-    """Return zeroed records that start on a cache line (vectors across two lines are read at half the speed)."""
+def _allocate_aligned(count: int, kind: np.dtype[np.void]) -> Structs:
+    """Return zeroed structs that start on a cache line (vectors across two lines are read at half the speed)."""
     line_size = 64
     buffer = np.zeros(count * kind.itemsize + line_size, dtype=np.uint8)
     skip = -buffer.ctypes.data % line_size
     return expose_fields(buffer[skip : skip + count * kind.itemsize].view(kind))
 
 
-def compute_step_constants(blocks: Records, lengths: Floats, substeps: int) -> Records:
+def compute_step_constants(blocks: Structs, lengths: Floats, substeps: int) -> Structs:
     """Compute the constants of a step of each length for every block (`STEP_CONSTANTS_DTYPE`)."""
-    steps = create_records(len(blocks), STEP_CONSTANTS_DTYPE)
+    steps = create_structs(len(blocks), STEP_CONSTANTS_DTYPE)
     lam, h = blocks["stiffness"], lengths[:, None]
     sign = np.array([1.0, -1.0])
     if substeps > 0:
@@ -118,7 +118,7 @@ def compute_stumpff(k: int, q: Any) -> Floats:
 
 
 @inlined
-def fill_lane(pool: SimulationPool, settings: Record, lane: int, index: int) -> None:
+def fill_lane(pool: SimulationPool, settings: Struct, lane: int, index: int) -> None:
     """Write the state and constants of a simulation into a lane."""
     group, state, steps, motion = (
         pool.groups[0],
@@ -191,11 +191,11 @@ def clear_lane(pool: SimulationPool, lane: int) -> None:
 
 
 @kernel
-def run_lanes(settings: Record, scratch: Record, pool: SimulationPool, substeps: int) -> None:
-    """Run all simulations of a pool under evenly sampled records to their ends.
+def run_lanes(settings: Struct, scratch: Struct, pool: SimulationPool, substeps: int) -> None:
+    """Run all simulations of a pool under evenly sampled structs to their ends.
 
-    ``substeps`` per sample is 0 in the linear model under constant weight. Afterwards ``ending`` of every state is an
-    `Ending`; PAUSED states can be continued individually.
+    ``substeps`` per sample is 0 in the linear model under constant weight. Afterwards ``status`` of every state is an
+    `MarchStatus`; PAUSED states can be continued individually.
     """
     for lane in range(LANE_COUNT):
         start_simulation(settings, scratch, pool, lane)
@@ -214,12 +214,12 @@ def run_lanes(settings: Record, scratch: Record, pool: SimulationPool, substeps:
 
 
 @kernel
-def march_blocks(settings: Record, scratch: Record, pool: SimulationPool) -> None:
-    """Run all simulations of a pool to their ends, one by one; ``ending`` of every state is then an `Ending`."""
+def march_blocks(settings: Struct, scratch: Struct, pool: SimulationPool) -> None:
+    """Run all simulations of a pool to their ends, one by one; ``status`` of every state is then an `MarchStatus`."""
     for index in range(pool.blocks.shape[0]):
         state = pool.states[index]
         ground = select_ground(pool.grounds, pool.motion_indices[index], pool.factors[index])
-        state.ending = march(ground, pool.blocks[index], settings, pool.table, scratch, state)
+        state.status = march(ground, pool.blocks[index], settings, pool.table, scratch, state)
 
 
 @inlined
@@ -239,7 +239,7 @@ def load_samples(pool: SimulationPool) -> None:
 
 
 @inlined
-def mark_slips(group: Record, unit: float, substeps: int) -> None:
+def mark_slips(group: Struct, unit: float, substeps: int) -> None:
     """Cause an event in each lane whose block may slip during a sample: without overturning angle until its march.
 
     See `sliding.may_slip`. The weight is constant; without substeps the model is linear. Rotations beyond twice the
@@ -259,7 +259,7 @@ def mark_slips(group: Record, unit: float, substeps: int) -> None:
 
 
 @inlined
-def find_largest_push(group: Record, lane: int, unit: float) -> float:
+def find_largest_push(group: Struct, lane: int, unit: float) -> float:
     """Return the largest absolute ground acceleration during a sample, g."""
     start, slope = compute_push_line(group, lane, unit)
     return max(abs(start), abs(start + slope * group.length[lane]))
@@ -272,7 +272,7 @@ def has_vertical_motion(pool: SimulationPool) -> bool:
 
 
 @inlined
-def step_group(settings: Record, pool: SimulationPool, substeps: int) -> int:
+def step_group(settings: Struct, pool: SimulationPool, substeps: int) -> int:
     """Step all lanes through their samples and return the number of those with possible events."""
     group, unit = pool.groups[0], pool.grounds.unit
     if settings.nonlinear:
@@ -283,7 +283,7 @@ def step_group(settings: Record, pool: SimulationPool, substeps: int) -> int:
 
 
 @inlined
-def march_lane(settings: Record, scratch: Record, pool: SimulationPool, lane: int) -> None:
+def march_lane(settings: Struct, scratch: Struct, pool: SimulationPool, lane: int) -> None:
     """March the block of a lane at least through one sample; if its simulation ends, start another one."""
     index = save_lane(pool, lane)
     if march_to_sample(settings, scratch, pool, index):
@@ -293,7 +293,7 @@ def march_lane(settings: Record, scratch: Record, pool: SimulationPool, lane: in
 
 
 @not_inlined
-def start_simulation(settings: Record, scratch: Record, pool: SimulationPool, lane: int) -> None:
+def start_simulation(settings: Struct, scratch: Struct, pool: SimulationPool, lane: int) -> None:
     """Start simulations until one rocks at the start of a sample, and put it into a lane; without one, clear it."""
     while pool.counts.started < pool.blocks.shape[0]:
         index = pool.counts.started
@@ -306,15 +306,15 @@ def start_simulation(settings: Record, scratch: Record, pool: SimulationPool, la
 
 
 @inlined
-def march_to_sample(settings: Record, scratch: Record, pool: SimulationPool, index: int) -> bool:
+def march_to_sample(settings: Struct, scratch: Struct, pool: SimulationPool, index: int) -> bool:
     """March a block until it rocks at the start of a sample that lanes may step, or to its end; False at its end."""
     state, block, motion = pool.states[index], pool.blocks[index], pool.motion_indices[index]
     ground = select_ground(pool.grounds, motion, pool.factors[index])
     end = pool.end_pieces[motion]
     while True:
         state.stop_piece = state.piece + 1 if state.piece < end else NO_STOP_PIECE
-        state.ending = march(ground, block, settings, pool.table, scratch, state)
-        if state.ending != Ending.RUNNING:
+        state.status = march(ground, block, settings, pool.table, scratch, state)
+        if state.status != MarchStatus.RUNNING:
             return False
         if state.side >= 0 and state.piece == state.stop_piece and state.offset == 0.0 and state.piece < end:
             return True

@@ -1,7 +1,7 @@
 """Calls of kernels in the library that was built with the package.
 
 The build creates a library for each processor level, and a manifest with hashes of the sources and argument types of
-the kernels. A kernel accepts the address of its arguments, packed into eight bytes each: numbers, addresses of records,
+the kernels. A kernel accepts the address of its arguments, packed into eight bytes each: numbers, addresses of structs,
 addresses and shapes of arrays, and members of tuples.
 """
 
@@ -146,7 +146,7 @@ def _make_packer(description: Any) -> Packer:
         return _pack_bool if description == "bool" else lambda value, packed: packed.append(value)
     if "tuple" in description:
         return _make_tuple_packer([_make_packer(member) for member in description["tuple"]])
-    return _make_array_packer(description) if "dimensions" in description else _make_record_packer(description)
+    return _make_array_packer(description) if "dimensions" in description else _make_struct_packer(description)
 
 
 def _pack_bool(value: Any, packed: list[Any]) -> None:
@@ -180,16 +180,16 @@ def _make_array_packer(description: dict[str, Any]) -> Packer:
     return pack_array
 
 
-def _make_record_packer(description: dict[str, Any]) -> Packer:
+def _make_struct_packer(description: dict[str, Any]) -> Packer:
     check = _make_layout_check(description["record"])
 
-    def pack_record(value: Any, packed: list[Any]) -> None:
+    def pack_struct(value: Any, packed: list[Any]) -> None:
         if not isinstance(value, np.void):
-            raise TypeError(f"a record is required, not {type(value).__name__}")
+            raise TypeError(f"a struct is required, not {type(value).__name__}")
         check(value.dtype)
         packed.append(np.frombuffer(value, np.uint8).ctypes.data)
 
-    return pack_record
+    return pack_struct
 
 
 def _make_layout_check(expected: str) -> Callable[[np.dtype[Any]], None]:

@@ -44,12 +44,12 @@ from rocking.kernels.sliding import (
 )
 from rocking.kernels.state import (
     AT_REST,
-    Ending,
     EventKind,
-    Record,
-    Records,
+    MarchStatus,
     RestRule,
     StepOutcome,
+    Struct,
+    Structs,
     TendonLaw,
     encode_resting_side,
     has_space,
@@ -71,8 +71,8 @@ _TOUCHING_STEP_RATIO = 1e-3
 
 
 @kernel
-def march(ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record) -> int:
-    """Simulate one block under one motion from its state on; return an `Ending` as a plain integer.
+def march(ground: Ground, block: Struct, settings: Struct, table: Structs, scratch: Struct, state: Struct) -> int:
+    """Simulate one block under one motion from its state on; return an `MarchStatus` as a plain integer.
 
     RUNNING: the piece ``state.stop_piece`` is reached; a block at rest may be at its next uplift. PAUSED: the budget is
     spent. FULL: the table is full. After each, call again with the same state.
@@ -81,18 +81,18 @@ def march(ground: Ground, block: Record, settings: Record, table: Records, scrat
         initialise_tendon(ground, block, settings, state)
     while state.piece < state.stop_piece:
         if state.budget <= 0:
-            return Ending.PAUSED.value
+            return MarchStatus.PAUSED.value
         if not has_space(settings, table, state):
-            return Ending.FULL.value
+            return MarchStatus.FULL.value
         state.budget -= 1
-        ending = march_step(ground, block, settings, table, scratch, state)
-        if ending != Ending.RUNNING:
-            return ending.value
-    return Ending.RUNNING.value
+        status = march_step(ground, block, settings, table, scratch, state)
+        if status != MarchStatus.RUNNING:
+            return status.value
+    return MarchStatus.RUNNING.value
 
 
 @inlined
-def initialise_tendon(ground: Ground, block: Record, settings: Record, state: Record) -> None:
+def initialise_tendon(ground: Ground, block: Struct, settings: Struct, state: Struct) -> None:
     """Apply the law of the state to a tendon; one that starts too far from rest has already yielded."""
     if compute_state_time(ground, state) == 0.0 and state.side >= 0:
         elongation = compute_elongation(block, settings.nonlinear, state.side, state.u)
@@ -101,7 +101,7 @@ def initialise_tendon(ground: Ground, block: Record, settings: Record, state: Re
 
 
 @inlined
-def march_step(ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record) -> Any:
+def march_step(ground: Ground, block: Struct, settings: Struct, table: Structs, scratch: Struct, state: Struct) -> Any:
     """Advance a block to its next uplift or, along an arc, to its first event."""
     write_node(ground, settings, table, state)
     if state.side < 0 and state.direction != 0:
@@ -120,34 +120,34 @@ def march_step(ground: Ground, block: Record, settings: Record, table: Records, 
         state.peak = block.overturn_angle
         write_node(ground, settings, table, state)
         write_event(settings, table, state, state.end_time, EventKind.OVERTURN)
-        return Ending.OVERTURNED
+        return MarchStatus.OVERTURNED
     if outcome == StepOutcome.STOPPED:
-        state.end_time = settings.stop
-        state.peak_time = min(state.peak_time, settings.stop)  # rounding may put a peak at the stop slightly later
+        state.end_time = settings.stop_time
+        state.peak_time = min(state.peak_time, settings.stop_time)  # rounding may put a peak at the stop slightly later
         write_node(ground, settings, table, state)
-        return Ending.DONE
+        return MarchStatus.DONE
     if outcome == StepOutcome.LEANS:
         state.end_time = compute_state_time(ground, state)
-        return Ending.LEANS
+        return MarchStatus.LEANS
     if outcome == StepOutcome.LOST:
         return lose_contact(ground, settings, table, state)
     if outcome == StepOutcome.SLIPS or outcome == StepOutcome.STICKS:
         write_slip_event(ground, settings, table, state)
-        return Ending.RUNNING
-    return Ending.BALANCED if outcome == StepOutcome.BALANCED else Ending.RUNNING
+        return MarchStatus.RUNNING
+    return MarchStatus.BALANCED if outcome == StepOutcome.BALANCED else MarchStatus.RUNNING
 
 
 @inlined
 def rest_until_uplift(
-    ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record
+    ground: Ground, block: Struct, settings: Struct, table: Structs, scratch: Struct, state: Struct
 ) -> int:
     """Keep a block at rest until the motion passes a threshold; DONE if it never does."""
-    uplift = find_next_uplift(ground, block, scratch, state.side, state.piece, state.offset, settings.stop)
-    if uplift.side == AT_REST or piece_start(ground, uplift.piece) + uplift.offset >= settings.stop:
+    uplift = find_next_uplift(ground, block, scratch, state.side, state.piece, state.offset, settings.stop_time)
+    if uplift.side == AT_REST or piece_start(ground, uplift.piece) + uplift.offset >= settings.stop_time:
         motion_end = piece_start(ground, last_piece(ground))
-        state.end_time = max(state.last_rest_time, motion_end) if settings.no_end_time else settings.stop
+        state.end_time = max(state.last_rest_time, motion_end) if settings.no_end_time else settings.stop_time
         state.time_at_rest += state.end_time - state.last_rest_time
-        return Ending.DONE
+        return MarchStatus.DONE
     state.piece = uplift.piece
     state.offset = uplift.offset
     state.side = uplift.side
@@ -159,7 +159,7 @@ def rest_until_uplift(
             state.time_at_rest += compute_state_time(ground, state) - state.last_rest_time
             start_slip(block, state, 1 - 2 * state.side)
             write_slip_event(ground, settings, table, state)
-            return Ending.RUNNING
+            return MarchStatus.RUNNING
     state.continuous_uplift = not uplift.is_jump
     state.last_uplift_time = state.last_impact_time = compute_state_time(ground, state)
     state.certificate_speed = np.inf
@@ -178,11 +178,11 @@ def rest_until_uplift(
         ):
             state.rounding_decisions += 1  # the last of its impacts may have been too late
     write_event(settings, table, state, state.last_uplift_time, EventKind.UPLIFT)
-    return Ending.RUNNING
+    return MarchStatus.RUNNING
 
 
 @inlined
-def step_along_arc(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> int:
+def step_along_arc(ground: Ground, block: Struct, settings: Struct, scratch: Struct, state: Struct) -> int:
     """Take one Taylor step along the arc, at most to its first event, and return its `StepOutcome`."""
     h_max = compute_time_to_boundary(ground, settings, state)
     if h_max <= 0.0:
@@ -203,7 +203,7 @@ def step_along_arc(ground: Ground, block: Record, settings: Record, scratch: Rec
 
 @inlined
 def take_full_step(
-    ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h_max: float
+    ground: Ground, block: Struct, settings: Struct, scratch: Struct, state: Struct, h_max: float
 ) -> StepEnd:
     """Step along the full series of the arc."""
     order, h, _ = expand_arc(ground, block, settings, scratch, state, h_max)
@@ -224,7 +224,7 @@ def take_full_step(
 
 @not_inlined
 def step_to_slip(
-    ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, end: StepEnd, h_max: float
+    ground: Ground, block: Struct, settings: Struct, scratch: Struct, state: Struct, end: StepEnd, h_max: float
 ) -> int:
     """Take a step that may leave the cone of friction; without that it ends at ``end``, which ignores friction."""
     order, h, time, direction = find_slip(ground, block, settings, scratch, state, end.time)
@@ -242,7 +242,7 @@ def step_to_slip(
 
 
 @inlined
-def start_slip(block: Record, state: Record, direction: int) -> None:
+def start_slip(block: Struct, state: Struct, direction: int) -> None:
     """Start a slip from zero velocity; a block on both pivots slides if it does not tip."""
     state.direction = direction
     state.slip_rate = 0.0
@@ -252,7 +252,7 @@ def start_slip(block: Record, state: Record, direction: int) -> None:
 
 @not_inlined
 def slip_along_arc(
-    ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h_max: float
+    ground: Ground, block: Struct, settings: Struct, scratch: Struct, state: Struct, h_max: float
 ) -> int:
     """Take a step of slide-rock, at most to its first event, and return its `StepOutcome`."""
     order, h = expand_slip(ground, block, settings, scratch, state, h_max)
@@ -280,48 +280,48 @@ def slip_along_arc(
 
 
 @inlined
-def slide_flat(ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record) -> int:
+def slide_flat(ground: Ground, block: Struct, settings: Struct, table: Structs, scratch: Struct, state: Struct) -> int:
     """Take a step of a block that slides on both pivots."""
     if compute_weight(ground, state.piece, state.offset) <= 0.0:
         return lose_contact(ground, settings, table, state)
     h_max = compute_time_to_boundary(ground, settings, state)
     if h_max <= 0.0:
-        state.end_time = settings.stop
-        return Ending.DONE
+        state.end_time = settings.stop_time
+        return MarchStatus.DONE
     degree = expand_slide(ground, block, scratch, state)
     h, stick_time, loss_time = find_slide_end(ground, block, scratch, state, degree, h_max)
     t = min(h, min(stick_time, loss_time))
     move_slip(scratch, state, degree, 1.0, t)
     outcome = finish_step(ground, settings, state, StepEnd(StepOutcome.STEP, t, 0.0, 0.0, 0.0, 0.0), h_max)
     if outcome == StepOutcome.STOPPED:
-        state.end_time = settings.stop
+        state.end_time = settings.stop_time
         write_node(ground, settings, table, state)
-        return Ending.DONE
+        return MarchStatus.DONE
     if stick_time <= min(h, loss_time):
         state.direction = 0
         state.slip_rate = 0.0
         count_rest(settings, table, state, compute_state_time(ground, state))
-    return lose_contact(ground, settings, table, state) if loss_time < min(h, stick_time) else Ending.RUNNING
+    return lose_contact(ground, settings, table, state) if loss_time < min(h, stick_time) else MarchStatus.RUNNING
 
 
 @inlined
-def lose_contact(ground: Ground, settings: Record, table: Records, state: Record) -> int:
+def lose_contact(ground: Ground, settings: Struct, table: Structs, state: Struct) -> int:
     """End a march because the ground no longer presses on the block."""
     state.end_time = compute_state_time(ground, state)
     write_node(ground, settings, table, state)
     write_event(settings, table, state, state.end_time, EventKind.LOST)
-    return Ending.LOST
+    return MarchStatus.LOST
 
 
 @inlined
-def write_slip_event(ground: Ground, settings: Record, table: Records, state: Record) -> None:
+def write_slip_event(ground: Ground, settings: Struct, table: Structs, state: Struct) -> None:
     """Write the start or end of a slip."""
     kind = EventKind.STICK if state.direction == 0 else (EventKind.SLIDE if state.side < 0 else EventKind.SLIDE_ROCK)
     write_event(settings, table, state, compute_state_time(ground, state), kind)
 
 
 @inlined
-def count_rest(settings: Record, table: Records, state: Record, time: float) -> None:
+def count_rest(settings: Struct, table: Structs, state: Struct, time: float) -> None:
     """Count and write a rest."""
     state.last_rest_time = time
     if state.rests == 0:
@@ -331,7 +331,7 @@ def count_rest(settings: Record, table: Records, state: Record, time: float) -> 
 
 
 @not_inlined
-def step_yielding(block: Record, settings: Record, scratch: Record, state: Record, order: int, h: float) -> StepEnd:
+def step_yielding(block: Struct, settings: Struct, scratch: Struct, state: Struct, order: int, h: float) -> StepEnd:
     """Step along a series to its first event or the next change of the tendon's law."""
     change, law = find_tendon_law_change(block, settings, scratch, state, order, h)
     end = advance_to_event(state, scratch, order, min(h, change), block.overturn_angle)
@@ -343,11 +343,11 @@ def step_yielding(block: Record, settings: Record, scratch: Record, state: Recor
 
 
 @inlined
-def finish_step(ground: Ground, settings: Record, state: Record, end: StepEnd, h_max: float) -> int:
+def finish_step(ground: Ground, settings: Struct, state: Struct, end: StepEnd, h_max: float) -> int:
     """Move the state to the end of a step and return its `StepOutcome`."""
     if end.peak > state.peak:
         raise_peak(state, end.peak, compute_state_time(ground, state) + end.peak_time)
-    time_to_stop = settings.stop - piece_start(ground, state.piece) - state.offset
+    time_to_stop = settings.stop_time - piece_start(ground, state.piece) - state.offset
     is_last_step = time_to_stop <= piece_length(ground, state.piece) - state.offset
     reaches_stop = end.outcome == StepOutcome.STEP and end.time >= h_max and is_last_step
     start = state.offset
@@ -369,7 +369,7 @@ def finish_step(ground: Ground, settings: Record, state: Record, end: StepEnd, h
 
 @inlined
 def process_impact(
-    ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record
+    ground: Ground, block: Struct, settings: Struct, table: Structs, scratch: Struct, state: Struct
 ) -> int:
     """Process an impact and the decision on rest; DONE if the march ends there."""
     normalise_offset(ground, state)
@@ -379,7 +379,7 @@ def process_impact(
         state.rounding_decisions += depth <= _AMBIGUOUS_DISTANCE * state.peak
         if depth <= _CONTACT_ROUNDING * state.peak:  # no impact, because it would put the block on the other side
             state.v = 0.0
-            return Ending.RUNNING
+            return MarchStatus.RUNNING
     time = compute_state_time(ground, state)
     speed = apply_impact(block, state)
     if block.has_friction:
@@ -396,12 +396,12 @@ def process_impact(
     rest = decide_rest(ground, block, settings, state, proof)
     state.last_impact_time = time
     if math.isnan(rest.time):
-        return Ending.RUNNING
+        return MarchStatus.RUNNING
     return finish_sequence(ground, block, settings, table, scratch, state, rest)
 
 
 @inlined
-def is_pushed_off_both_sides(ground: Ground, block: Record, state: Record, offset: float) -> bool:
+def is_pushed_off_both_sides(ground: Ground, block: Struct, state: Struct, offset: float) -> bool:
     """Return whether a block at zero rotation is pushed off to both sides."""
     side_acceleration = compute_restoring(ground, block, state.side, state.piece, offset)
     other_acceleration = compute_restoring(ground, block, block.next_side[state.side], state.piece, offset)
@@ -409,7 +409,7 @@ def is_pushed_off_both_sides(ground: Ground, block: Record, state: Record, offse
 
 
 @not_inlined
-def nearly_touches(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h: float) -> bool:
+def nearly_touches(ground: Ground, block: Struct, settings: Struct, scratch: Struct, state: Struct, h: float) -> bool:
     """Return whether the arc from a state has a minimum within h so near zero that rounding may hide an impact.
 
     With positive weight, the impact would change the number of impacts, but not the motion.
@@ -428,34 +428,34 @@ def nearly_touches(ground: Ground, block: Record, settings: Record, scratch: Rec
 
 @inlined
 def finish_sequence(
-    ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record, rest: Rest
+    ground: Ground, block: Struct, settings: Struct, table: Structs, scratch: Struct, state: Struct, rest: Rest
 ) -> int:
     """Finish a sequence of impacts; DONE if the march stops before the block is at rest."""
     time = compute_state_time(ground, state)
-    state.rests_by_rounding += rest.by_rounding
+    state.rests_by_rounding += rest.is_by_rounding
     if state.proven_impacts == 0 or not rest.upper >= 0.0:
         state.proven_impacts = 1
         state.sequence_start = time
     write_node(ground, settings, table, state)
     write_sequence(settings, table, state, time, (rest.lower, rest.upper, rest.time))
     state.proven_impacts = 0
-    if time + rest.time >= settings.stop:
-        state.end_time = settings.stop
-        return Ending.DONE
+    if time + rest.time >= settings.stop_time:
+        state.end_time = settings.stop_time
+        return MarchStatus.DONE
     if state.direction != 0:
         finish_while_sliding(ground, block, settings, table, scratch, state, rest.time)
-        return Ending.RUNNING
+        return MarchStatus.RUNNING
     state.side = encode_resting_side(block, state.side)
     state.u = state.v = 0.0
     count_rest(settings, table, state, time + rest.time)
     state.offset += rest.time
     normalise_offset(ground, state)
-    return Ending.RUNNING
+    return MarchStatus.RUNNING
 
 
 @not_inlined
 def finish_while_sliding(
-    ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record, duration: float
+    ground: Ground, block: Struct, settings: Struct, table: Structs, scratch: Struct, state: Struct, duration: float
 ) -> None:
     """Move a block to the end of a sequence of impacts after which it slides."""
     i = state.side
@@ -482,14 +482,14 @@ def finish_while_sliding(
 
 
 @inlined
-def compute_time_to_boundary(ground: Ground, settings: Record, state: Record) -> float:
+def compute_time_to_boundary(ground: Ground, settings: Struct, state: Struct) -> float:
     """Return the time to the end of the piece or of the response, whichever is first."""
-    time_to_stop = settings.stop - piece_start(ground, state.piece) - state.offset
+    time_to_stop = settings.stop_time - piece_start(ground, state.piece) - state.offset
     return min(piece_length(ground, state.piece) - state.offset, time_to_stop)
 
 
 @inlined
-def normalise_offset(ground: Ground, state: Record) -> None:
+def normalise_offset(ground: Ground, state: Struct) -> None:
     """Bring the offset within its piece."""
     while state.offset >= piece_length(ground, state.piece):
         state.offset -= piece_length(ground, state.piece)

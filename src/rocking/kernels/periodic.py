@@ -18,7 +18,7 @@ from rocking.kernels.events import compute_restitution_factor, compute_speed_slo
 from rocking.kernels.ground import ROUNDING, Ground, piece_length, piece_start, scale_coefficients
 from rocking.kernels.march import march
 from rocking.kernels.series import write_variation_coefficients
-from rocking.kernels.state import AT_REST, Ending, Record, Records
+from rocking.kernels.state import AT_REST, MarchStatus, Struct, Structs
 from rocking.kernels.trace import Trail, expand_unforced
 from rocking.kernels.uplift import find_next_uplift
 
@@ -57,9 +57,9 @@ class PeriodicProblem(NamedTuple):
     """Body under a periodic motion, and the data that the march of its states requires."""
 
     ground: Ground  # motion
-    block: Record  # body
-    settings: Record  # settings of the computation
-    table: Records  # table without rows
+    block: Struct  # body
+    settings: Struct  # settings of the computation
+    table: Structs  # table without rows
     steps: Floats  # `build_step_rows`; without rows, every step is marched
 
 
@@ -70,8 +70,8 @@ TRAP_COLUMNS = 6
 @kernel
 def iterate_periods(
     problem: PeriodicProblem,
-    scratch: Record,
-    states: Records,
+    scratch: Struct,
+    states: Structs,
     periods: int,
     orbit: Floats,
     traps: Floats,
@@ -80,7 +80,7 @@ def iterate_periods(
 ) -> None:
     """Take each state through at most ``periods`` periods, until it enters a trap, overturns or rests forever.
 
-    ``ending`` is then its `PeriodOutcome`, ``trap_rows[k]`` the row of its trap in ``traps``, shape
+    ``status`` is then its `PeriodOutcome`, ``trap_rows[k]`` the row of its trap in ``traps``, shape
     (n, `TRAP_COLUMNS`), or -1, and ``period_counts[k]`` the number of periods. Row n of ``orbit[k]``, if any, is
     (u, v, side) after n + 1 periods, unchanged after the last known state.
     """
@@ -102,11 +102,11 @@ def iterate_periods(
             if trap_rows[k] >= 0 or outcome == PeriodOutcome.RESTS_FOR_EVER or not is_known:
                 period_counts[k] = n + 1
                 break
-        state.ending = outcome
+        state.status = outcome
 
 
 @inlined
-def find_trap(traps: Floats, state: Record, rests: bool, two_stops: bool) -> int:
+def find_trap(traps: Floats, state: Struct, rests: bool, two_stops: bool) -> int:
     """Return the row of the first trap that contains a state, or -1."""
     for j in range(traps.shape[0]):
         row = traps[j]
@@ -122,30 +122,30 @@ def find_trap(traps: Floats, state: Record, rests: bool, two_stops: bool) -> int
 
 
 @inlined
-def write_state(row: Floats, state: Record) -> None:
+def write_state(row: Floats, state: Struct) -> None:
     """Write a state: coordinate in the frame of its side, velocity, side."""
     row[0], row[1], row[2] = state.u, state.v, state.side
 
 
 @not_inlined
-def advance_period(problem: PeriodicProblem, scratch: Record, state: Record) -> int:
+def advance_period(problem: PeriodicProblem, scratch: Struct, state: Struct) -> int:
     """Advance a state by one period and return its `PeriodOutcome`."""
     ground, block, settings, table, steps = problem
     pieces = count_pieces(ground)
     state.budget = compute_iteration_budget(state)
-    ending = Ending.RUNNING.value
-    while ending == Ending.RUNNING and state.piece < pieces:
+    status = MarchStatus.RUNNING.value
+    while status == MarchStatus.RUNNING and state.piece < pieces:
         state.stop_piece = pieces
         if state.side >= 0 and state.offset == 0.0 and steps.shape[1] > 0:
             if not state.continuous_uplift and skip_piece(steps[state.side, state.piece], block.overturn_angle, state):
                 continue
             state.stop_piece = state.piece + 1
-        ending = march(ground, block, settings, table, scratch, state)
-    return shift_back(ground, block, state, ending)
+        status = march(ground, block, settings, table, scratch, state)
+    return shift_back(ground, block, state, status)
 
 
 @inlined
-def compute_iteration_budget(state: Record) -> int:
+def compute_iteration_budget(state: Struct) -> int:
     """Return the number of march iterations allowed from a state."""
     return MAX_ITERATIONS if state.u < MAX_STATE and abs(state.v) < MAX_STATE else 0
 
@@ -162,7 +162,7 @@ _GROWTH = 2.118
 
 
 @inlined
-def skip_piece(row: Floats, overturn_angle: float, state: Record) -> bool:
+def skip_piece(row: Floats, overturn_angle: float, state: Struct) -> bool:
     """Advance a state by a piece in closed form if bounds exclude an event, and return whether they do.
 
     N = sqrt(|lam|) |u| + |v| grows at a rate of at most (sqrt(|lam|) + c) N + F under a force F, and |u''| is at most
@@ -180,7 +180,7 @@ def skip_piece(row: Floats, overturn_angle: float, state: Record) -> bool:
     return True
 
 
-def build_step_rows(ground: Ground, block: Record) -> Floats:
+def build_step_rows(ground: Ground, block: Struct) -> Floats:
     """Compute rows for `skip_piece` for each side and piece of the first period, shape (2, pieces, columns).
 
     There are none if a piece is too long for the bounds or the body has no such side.
@@ -227,21 +227,21 @@ def count_pieces(ground: Ground) -> int:
 
 
 @inlined
-def shift_back(ground: Ground, block: Record, state: Record, ending: int) -> int:
+def shift_back(ground: Ground, block: Struct, state: Struct, status: int) -> int:
     """Move a state back by the period that it has passed, and return its `PeriodOutcome`."""
     pieces = count_pieces(ground)
-    if ending == Ending.OVERTURNED:
+    if status == MarchStatus.OVERTURNED:
         return PeriodOutcome.OVERTURNED
-    if ending == Ending.DONE or (ending == Ending.RUNNING and state.piece >= 2 * pieces):
+    if status == MarchStatus.DONE or (status == MarchStatus.RUNNING and state.piece >= 2 * pieces):
         # Even the second period does not lift the body; the march may have followed an uplift by the additional pieces.
         if state.u == 0.0 and state.v == 0.0:
             state.side = AT_REST if state.side < 0 or not block.two_stops else -1 - state.side
             return PeriodOutcome.RESTS_FOR_EVER
         return PeriodOutcome.UNFINISHED
-    if ending == Ending.BALANCED:
+    if status == MarchStatus.BALANCED:
         state.piece, state.offset = 0, 0.0
         return PeriodOutcome.MOVES
-    if ending != Ending.RUNNING or not (state.u >= 0.0 and abs(state.v) < np.inf):
+    if status != MarchStatus.RUNNING or not (state.u >= 0.0 and abs(state.v) < np.inf):
         return PeriodOutcome.UNFINISHED
     period = piece_start(ground, pieces)
     state.piece -= pieces
@@ -257,13 +257,13 @@ def shift_back(ground: Ground, block: Record, state: Record, ending: int) -> int
 
 @kernel
 def differentiate_periods(
-    trail: Trail, scratch: Record, variation: Record, table: Records, states: Records, out: Floats
+    trail: Trail, scratch: Struct, variation: Struct, table: Structs, states: Structs, out: Floats
 ) -> None:
     """Write the derivative of each state after one period by the state before it, in the frames of their sides.
 
     It is exactly zero if the body has come to rest for any time, or is held at rest at the start. At a stop that does
     not hold the body, it is the derivative for states off the stop. The trail's settings make the march write its
-    table, whose rows are reused. ``states`` are advanced by the period, with ``ending`` their `PeriodOutcome`.
+    table, whose rows are reused. ``states`` are advanced by the period, with ``status`` their `PeriodOutcome`.
     """
     for k in range(states.shape[0]):
         differentiate_period(trail, scratch, variation, table, states[k], out[k])
@@ -271,7 +271,7 @@ def differentiate_periods(
 
 @not_inlined
 def differentiate_period(
-    trail: Trail, scratch: Record, variation: Record, table: Records, state: Record, M: Floats
+    trail: Trail, scratch: Struct, variation: Struct, table: Structs, state: Struct, M: Floats
 ) -> tuple[int, float]:
     """Take one state through a period and write its derivative, as `differentiate_periods`.
 
@@ -281,41 +281,41 @@ def differentiate_period(
     ground, block, settings, _ = trail
     initial = 1.0
     if state.side < 0:
-        uplift = find_next_uplift(ground, block, scratch, state.side, state.piece, state.offset, settings.stop)
+        uplift = find_next_uplift(ground, block, scratch, state.side, state.piece, state.offset, settings.stop_time)
         is_held = uplift.side < 0 or uplift.piece > state.piece or uplift.offset > state.offset
         # The state at rest is independent of the past; the frame of a body that leaves immediately belongs to no side.
         initial = 0.0 if is_held else side_sign(uplift.side)
     M[0, 0], M[0, 1], M[1, 0], M[1, 1] = initial, 0.0, 0.0, initial
     state.stop_piece = count_pieces(ground)
     state.budget = compute_iteration_budget(state)
-    ending = Ending.FULL.value
+    status = MarchStatus.FULL.value
     impacts, area = 0, 0.0
-    while ending == Ending.FULL:
+    while status == MarchStatus.FULL:
         state.nodes = state.impacts = state.events = state.sequences = 0
-        ending = march(ground, block, settings, table, scratch, state)
+        status = march(ground, block, settings, table, scratch, state)
         impacts += state.impacts
         for n in range(state.nodes - 1):
             area += apply_step(trail, scratch, variation, table[n].node, table[n + 1].node, M)
         if state.nodes > 0:
             area += apply_step(trail, scratch, variation, table[state.nodes - 1].node, state, M)
-    state.ending = shift_back(ground, block, state, ending)
-    if state.ending == PeriodOutcome.RESTS or state.ending == PeriodOutcome.RESTS_FOR_EVER:
+    state.status = shift_back(ground, block, state, status)
+    if state.status == PeriodOutcome.RESTS or state.status == PeriodOutcome.RESTS_FOR_EVER:
         M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = 0.0
-    elif state.ending != PeriodOutcome.MOVES:
+    elif state.status != PeriodOutcome.MOVES:
         M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = np.nan
     return impacts, area
 
 
 @kernel
 def measure_stretches(
-    trail: Trail, scratch: Record, variation: Record, table: Records, state: Record, frame: Floats, logs: Floats
+    trail: Trail, scratch: Struct, variation: Struct, table: Structs, state: Struct, frame: Floats, logs: Floats
 ) -> int:
     """Take a state through one period per row of ``logs``, and write the stretches of a frame of directions.
 
     A row contains the logarithms of the stretch along a direction that follows the derivatives, and so becomes the one
     that grows fastest, and across it: the diagonal of R where the derivative times Q is Q' R. Both are -inf in a period
     with a rest, after which the direction is arbitrary. Rows end before the period of overturning or permanent rest;
-    ``ending`` is the `PeriodOutcome`. Row 2 of ``frame``, shape (3, 2), is the direction, the others are scratch space.
+    ``status`` is the `PeriodOutcome`. Row 2 of ``frame``, shape (3, 2), is the direction, the others are scratch space.
     Returns the number of impacts.
     """
     M = frame[:2]
@@ -323,7 +323,7 @@ def measure_stretches(
     for n in range(logs.shape[0]):
         new_impacts, area = differentiate_period(trail, scratch, variation, table, state, M)
         impacts += new_impacts
-        if state.ending != PeriodOutcome.MOVES and state.ending != PeriodOutcome.RESTS:
+        if state.status != PeriodOutcome.MOVES and state.status != PeriodOutcome.RESTS:
             break
         c, s = frame[2, 0], frame[2, 1]
         x, y = M[0, 0] * c + M[0, 1] * s, M[1, 0] * c + M[1, 1] * s
@@ -338,7 +338,7 @@ def measure_stretches(
 
 
 @not_inlined
-def apply_step(trail: Trail, scratch: Record, variation: Record, node: Record, next_node: Record, M: Floats) -> float:
+def apply_step(trail: Trail, scratch: Struct, variation: Struct, node: Struct, next_node: Struct, M: Floats) -> float:
     """Multiply a derivative by the derivative of the step from a node to ``next_node``, with any impact at its end.
 
     Returns the logarithm of the |determinant| of the step.
@@ -368,7 +368,7 @@ def apply_step(trail: Trail, scratch: Record, variation: Record, node: Record, n
 
 
 @inlined
-def apply_rest_derivative(ground: Ground, block: Record, node: Record, next_node: Record, M: Floats) -> float:
+def apply_rest_derivative(ground: Ground, block: Struct, node: Struct, next_node: Struct, M: Floats) -> float:
     """Multiply a derivative by the derivative until a rest: zero, unless the ground ends the rest immediately.
 
     No speed is left then, and the time of leaving depends on the time of impact. Returns the logarithm of the
@@ -389,7 +389,7 @@ def apply_rest_derivative(ground: Ground, block: Record, node: Record, next_node
 
 
 @inlined
-def apply_saltation(ground: Ground, block: Record, departed_side: int, next_node: Record, v: float, M: Floats) -> float:
+def apply_saltation(ground: Ground, block: Struct, departed_side: int, next_node: Struct, v: float, M: Floats) -> float:
     """Multiply a derivative by the saltation of an impact, before which the velocity was v.
 
     Returns the logarithm of its |determinant|.

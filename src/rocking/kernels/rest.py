@@ -12,7 +12,7 @@ from rocking.kernels.events import compute_mean_factor, is_factor_random
 from rocking.kernels.ground import Ground, coefficient, piece_length, piece_start
 from rocking.kernels.remaining import THIRD, Pair
 from rocking.kernels.sliding import compute_slip_factor, compute_slip_restoring
-from rocking.kernels.state import PROVEN_PER_ITERATION, Record, Records, RestRule, write_impact, write_node
+from rocking.kernels.state import PROVEN_PER_ITERATION, RestRule, Struct, Structs, write_impact, write_node
 
 ULP = 2.0**-52
 
@@ -34,17 +34,17 @@ class Rest(NamedTuple):
     lower: float  # lower bound on the time to rest
     upper: float  # upper bound on the time to rest
     time: float  # time to rest; NaN: not yet
-    by_rounding: bool  # at rest only because time no longer advances
+    is_by_rounding: bool  # at rest only because time no longer advances
 
 
 @inlined
-def compute_state_time(ground: Ground, state: Record) -> float:
+def compute_state_time(ground: Ground, state: Struct) -> float:
     """Return the time of a state."""
     return piece_start(ground, state.piece) + state.offset
 
 
 @inlined
-def count_impact(state: Record) -> None:
+def count_impact(state: Struct) -> None:
     """Count an impact of a proven sequence or, before a proof, set the speed for the next attempt."""
     if state.proven_impacts > 0:
         state.proven_impacts += 1
@@ -53,7 +53,7 @@ def count_impact(state: Record) -> None:
 
 
 @inlined
-def store_proof(ground: Ground, block: Record, settings: Record, state: Record, proof: Proof) -> None:
+def store_proof(ground: Ground, block: Struct, settings: Struct, state: Struct, proof: Proof) -> None:
     """Store the time since which chattering is proven and the speed for the next proof."""
     if not proof.upper >= 0.0:
         state.certificate_speed = _RETRY_RATIO * state.v
@@ -78,7 +78,7 @@ def store_proof(ground: Ground, block: Record, settings: Record, state: Record, 
 
 
 @inlined
-def compute_time_to_last_piece(ground: Ground, state: Record, time: float) -> float:
+def compute_time_to_last_piece(ground: Ground, state: Struct, time: float) -> float:
     """Return the time from a state to the start of the piece that is reached ``time`` later."""
     piece = state.piece
     wait = 0.0
@@ -91,7 +91,7 @@ def compute_time_to_last_piece(ground: Ground, state: Record, time: float) -> fl
 
 
 @not_inlined
-def bound_rest(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> Proof:
+def bound_rest(ground: Ground, block: Struct, settings: Struct, scratch: Struct, state: Struct) -> Proof:
     """Compute proven bounds on the time to rest, widened by the rounding of all times; all NaN: no proof."""
     if state.direction == 0:
         lower, upper, time, height = prove_rest(ground, block, settings, scratch, state)
@@ -102,14 +102,14 @@ def bound_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
 
 
 @inlined
-def bound_rounding_of_rest(time: float, upper: float, state: Record) -> float:
+def bound_rounding_of_rest(time: float, upper: float, state: Struct) -> float:
     """Compute an allowance for the rounding of times and of the arcs since the first proof."""
     since_proof = time - state.sequence_start if state.proven_impacts > 0 else 0.0
     return 4.0 * ULP * time + 8.0 * ULP * (max(state.proven_impacts, 1) + 4) * (since_proof + upper)
 
 
 @not_inlined
-def decide_rest(ground: Ground, block: Record, settings: Record, state: Record, proof: Proof) -> Rest:
+def decide_rest(ground: Ground, block: Struct, settings: Struct, state: Struct, proof: Proof) -> Rest:
     """Decide whether the block comes to rest at an impact, given the proven bounds (NaN: none)."""
     time = compute_state_time(ground, state)
     if settings.rest_rule == RestRule.CERTIFIED:
@@ -131,12 +131,12 @@ def decide_rest(ground: Ground, block: Record, settings: Record, state: Record, 
         is_late = settings.rest_rule == RestRule.TIME and time - state.last_uplift_time >= limit
         if is_slow or is_frequent or is_late:
             return Rest(np.nan, np.nan, 0.0, False)
-    by_rounding = is_within_time_rounding(ground, block, settings, state)
-    return Rest(np.nan, np.nan, 0.0 if by_rounding or state.v == 0.0 else np.nan, by_rounding)
+    is_by_rounding = is_within_time_rounding(ground, block, settings, state)
+    return Rest(np.nan, np.nan, 0.0 if is_by_rounding or state.v == 0.0 else np.nan, is_by_rounding)
 
 
 @inlined
-def sum_geometric_arcs(ground: Ground, block: Record, settings: Record, state: Record) -> float:
+def sum_geometric_arcs(ground: Ground, block: Struct, settings: Struct, state: Struct) -> float:
     """Compute the time to rest after an impact under constant accelerations, or NaN if one does not press down.
 
     Sum of the paper's Eq. 75 without remainder: arcs of 2 v/g, with speeds reduced by a factor at each impact.
@@ -154,7 +154,7 @@ def sum_geometric_arcs(ground: Ground, block: Record, settings: Record, state: R
 
 
 @inlined
-def compute_present_restoring(ground: Ground, block: Record, settings: Record, state: Record, side: int) -> float:
+def compute_present_restoring(ground: Ground, block: Struct, settings: Struct, state: Struct, side: int) -> float:
     """Compute the restoring acceleration of a side at zero rotation for the present slip, if any."""
     if state.direction == 0:
         return compute_restoring(ground, block, side, state.piece, state.offset)
@@ -163,7 +163,7 @@ def compute_present_restoring(ground: Ground, block: Record, settings: Record, s
 
 
 @inlined
-def is_within_time_rounding(ground: Ground, block: Record, settings: Record, state: Record) -> bool:
+def is_within_time_rounding(ground: Ground, block: Struct, settings: Struct, state: Struct) -> bool:
     """Return whether time hardly advanced since the last impact and will not until the next."""
     time = compute_state_time(ground, state)
     max_stiffness = max(abs(block.stiffness[0]), abs(block.stiffness[1]))
@@ -179,7 +179,7 @@ MAX_GAMMA = 2.0**-14
 
 @not_inlined
 def apply_proven_impacts(
-    ground: Ground, block: Record, settings: Record, table: Records, state: Record, duration: float
+    ground: Ground, block: Struct, settings: Struct, table: Structs, state: Struct, duration: float
 ) -> None:
     """March the linear model through some impacts within ``duration``, up to the one with another proof.
 

@@ -8,7 +8,7 @@ There are three laws:
     SLACK     until e - plastic rises to ``slack``
     PLASTIC   until the block turns back; the plastic elongation is then e - yields
 
-A law is constant during an arc. The block's record contains the present one, so that other kernels have constant
+A law is constant during an arc. The block's struct contains the present one, so that other kernels have constant
 coefficients.
 """
 
@@ -19,15 +19,15 @@ import numpy as np
 from rocking.core.arrays import Floats
 from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.events import find_first_root
-from rocking.kernels.state import Record, Records, TendonLaw
+from rocking.kernels.state import Struct, Structs, TendonLaw
 
 #: Distance from a level, relative to it, that is rounding.
 _LEVEL_TOLERANCE = 2.0**-44
 
 
 @not_inlined
-def apply_tendon_law(block: Record, law: int, plastic_elongation: float) -> None:
-    """Write a law and its quantities at a plastic elongation into the record of a block."""
+def apply_tendon_law(block: Struct, law: int, plastic_elongation: float) -> None:
+    """Write a law and its quantities at a plastic elongation into the struct of a block."""
     for side in range(2):
         # Force at zero elongation, divided by inertia and lever arm.
         force = -block.tendon_stiffness[side] * (plastic_elongation + block.slack_elongation)
@@ -45,7 +45,7 @@ def apply_tendon_law(block: Record, law: int, plastic_elongation: float) -> None
 
 
 @inlined
-def find_rotation(block: Record, nonlinear: bool, side: int, elongation: float) -> float:
+def find_rotation(block: Struct, nonlinear: bool, side: int, elongation: float) -> float:
     """Compute the rotation for an elongation of the tendon, or an infinity of the same sign if there is none."""
     x = block.lever_arm[side]
     if x <= 0.0 or (nonlinear and abs(elongation) >= 2.0 * x):
@@ -54,19 +54,19 @@ def find_rotation(block: Record, nonlinear: bool, side: int, elongation: float) 
 
 
 @inlined
-def compute_elongation(block: Record, nonlinear: bool, side: int, u: float) -> float:
+def compute_elongation(block: Struct, nonlinear: bool, side: int, u: float) -> float:
     """Compute the elongation of the tendon at a rotation."""
     return block.lever_arm[side] * (2.0 * math.sin(0.5 * u) if nonlinear else u)
 
 
 @inlined
-def find_tendon_law_at_rest(block: Record, plastic_elongation: float) -> int:
+def find_tendon_law_at_rest(block: Struct, plastic_elongation: float) -> int:
     """Return the law while the block stands."""
     return TendonLaw.ELASTIC if plastic_elongation + block.slack_elongation <= 0.0 else TendonLaw.SLACK
 
 
 @inlined
-def may_tendon_law_change_below(block: Record, settings: Record, plastic_elongation: float, height: float) -> bool:
+def may_tendon_law_change_below(block: Struct, settings: Struct, plastic_elongation: float, height: float) -> bool:
     """Return whether the law of a standing block changes below a height on one of its sides."""
     is_slack = find_tendon_law_at_rest(block, plastic_elongation) == TendonLaw.SLACK
     level = block.slack_elongation if is_slack else block.yield_elongation
@@ -77,7 +77,7 @@ def may_tendon_law_change_below(block: Record, settings: Record, plastic_elongat
 
 @not_inlined
 def find_tendon_law_change(
-    block: Record, settings: Record, scratch: Record, state: Record, order: int, h: float
+    block: Struct, settings: Struct, scratch: Struct, state: Struct, order: int, h: float
 ) -> tuple[float, int]:
     """Find the time of the first change of the law along an arc, inf if none within h, and the law after it."""
     c, d, side = scratch.rotation, scratch.auxiliary, state.side
@@ -122,7 +122,7 @@ def find_first_negative(d: Floats, order: int, h: float) -> float:
 
 
 @inlined
-def update_plastic_elongation(block: Record, settings: Record, nodes: Records, row: int, previous: float) -> float:
+def update_plastic_elongation(block: Struct, settings: Struct, nodes: Structs, row: int, previous: float) -> float:
     """Return the plastic elongation at a node, from the node itself or from its value ``previous``."""
     node = nodes[row]
     turns_back = row > 0 and node.tendon_law == TendonLaw.ELASTIC and nodes[row - 1].tendon_law == TendonLaw.PLASTIC
@@ -132,7 +132,7 @@ def update_plastic_elongation(block: Record, settings: Record, nodes: Records, r
 
 
 @inlined
-def change_tendon_law(block: Record, settings: Record, state: Record, law: int, u: float) -> None:
+def change_tendon_law(block: Struct, settings: Struct, state: Struct, law: int, u: float) -> None:
     """Change the law of a block at a rotation."""
     if state.tendon_law == TendonLaw.PLASTIC:
         state.plastic_elongation = max(
@@ -167,7 +167,7 @@ _GAUSS_LEGENDRE = (
 
 
 @not_inlined
-def find_leaning_rotation(block: Record, settings: Record, state: Record, acceleration: float) -> float:
+def find_leaning_rotation(block: Struct, settings: Struct, state: Struct, acceleration: float) -> float:
     """Find the rotation without moment about which a body leans forever; NaN if this is not proven.
 
     The largest rotation so far will not be exceeded by more than the fraction `PEAK_MARGIN`. Either the body, with the
@@ -202,7 +202,7 @@ def find_leaning_rotation(block: Record, settings: Record, state: Record, accele
 
 
 @not_inlined
-def find_barrier(block: Record, tendon_state: tuple[bool, int, float], start: float, end: float) -> tuple[float, float]:
+def find_barrier(block: Struct, tendon_state: tuple[bool, int, float], start: float, end: float) -> tuple[float, float]:
     """Find the first interval of rotations between two that turns a body back; NaN: none.
 
     It ends at ``end`` if all later rotations turn the body back.
@@ -218,7 +218,7 @@ def find_barrier(block: Record, tendon_state: tuple[bool, int, float], start: fl
 
 
 @inlined
-def bisect_moment(block: Record, tendon_state: tuple[bool, int, float], start: float, end: float) -> float:
+def bisect_moment(block: Struct, tendon_state: tuple[bool, int, float], start: float, end: float) -> float:
     """Find the rotation at which the moment changes its sign between two rotations, by bisection."""
     sign = compute_static_restoring(block, tendon_state, start)
     for _ in range(_BISECTIONS):
@@ -231,7 +231,7 @@ def bisect_moment(block: Record, tendon_state: tuple[bool, int, float], start: f
 
 
 @not_inlined
-def bound_energy_rise(block: Record, tendon_state: tuple[bool, int, float], start: float, end: float) -> float:
+def bound_energy_rise(block: Struct, tendon_state: tuple[bool, int, float], start: float, end: float) -> float:
     """Compute a lower bound on the change of potential energy along a path, divided by inertia, law by law."""
     nonlinear, side, plastic_elongation = tendon_state
     low, high, total = min(start, end), max(start, end), 0.0
@@ -251,7 +251,7 @@ def bound_energy_rise(block: Record, tendon_state: tuple[bool, int, float], star
 
 
 @inlined
-def compute_static_restoring(block: Record, tendon_state: tuple[bool, int, float], u: float) -> float:
+def compute_static_restoring(block: Struct, tendon_state: tuple[bool, int, float], u: float) -> float:
     """Compute the restoring acceleration at a rotation without ground motion and damping."""
     nonlinear, side, plastic_elongation = tendon_state
     weight, push, pull = block.added_weight[side], block.added_push[side], block.prestress[side]

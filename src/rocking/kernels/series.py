@@ -26,7 +26,7 @@ A NaN among the arguments makes every later coefficient NaN.
 import numpy as np
 
 from rocking.kernels.compiled import inlined
-from rocking.kernels.state import ORDER, Record
+from rocking.kernels.state import ORDER, Struct
 
 #: Value of a quantity that is linear in time, and its slope or change during a step.
 ValueAndSlope = tuple[float, float]
@@ -54,7 +54,7 @@ def apply_weight(weight: ValueAndSlope | None, current: float, previous: float) 
 
 
 @inlined
-def write_linear_coefficients(block: Record, state: Record, scratch: Record, degree: int, order: int) -> None:
+def write_linear_coefficients(block: Struct, state: Struct, scratch: Struct, degree: int, order: int) -> None:
     """Write c[0] to c[order] of a linear arc under constant weight and a motion of ``degree`` into scratch.rotation."""
     c, A, side = scratch.rotation, scratch.ground, state.side
     lam, gain = block.stiffness[side], block.restoring_gain[side]
@@ -68,7 +68,7 @@ def write_linear_coefficients(block: Record, state: Record, scratch: Record, deg
 
 
 @inlined
-def compute_weighted_coefficient(block: Record, side: int, scratch: Record, degree: int, k: int) -> float:
+def compute_weighted_coefficient(block: Struct, side: int, scratch: Struct, degree: int, k: int) -> float:
     """Compute c[k + 2] of a linear arc under varying weight from the earlier coefficients.
 
     ``degree`` applies to both the motion and the weight.
@@ -82,7 +82,7 @@ def compute_weighted_coefficient(block: Record, side: int, scratch: Record, degr
 
 
 @inlined
-def compute_nonlinear_coefficient(lam: float, scratch: Record, degrees: tuple[int, int], k: int) -> float:
+def compute_nonlinear_coefficient(lam: float, scratch: Struct, degrees: tuple[int, int], k: int) -> float:
     """Compute c[k + 2] of a nonlinear arc from sin and cos(alpha - u) up to k, for the degrees of motion and weight."""
     A, W, S, C = scratch.ground, scratch.weight, scratch.sine, scratch.cosine
     degree, weight_degree = degrees
@@ -96,7 +96,7 @@ def compute_nonlinear_coefficient(lam: float, scratch: Record, degrees: tuple[in
 
 
 @inlined
-def write_angle_coefficients(scratch: Record, k: int) -> None:
+def write_angle_coefficients(scratch: Struct, k: int) -> None:
     """Write the coefficients k + 1 of sin and cos(alpha - u) from the earlier ones and c[1] to c[k + 1]."""
     c, S, C = scratch.rotation, scratch.sine, scratch.cosine
     sine = 0.0
@@ -111,7 +111,7 @@ def write_angle_coefficients(scratch: Record, k: int) -> None:
 
 @inlined
 def compute_restrained_coefficient(
-    block: Record, side: int, scratch: Record, degrees: tuple[int, int], nonlinear: bool, k: int
+    block: Struct, side: int, scratch: Struct, degrees: tuple[int, int], nonlinear: bool, k: int
 ) -> float:
     """Compute coefficient k of u'' + c u' from the rotation up to k."""
     c, A, W = scratch.rotation, scratch.ground, scratch.weight
@@ -132,7 +132,7 @@ def compute_restrained_coefficient(
 
 
 @inlined
-def write_half_angle_coefficients(scratch: Record, k: int) -> None:
+def write_half_angle_coefficients(scratch: Struct, k: int) -> None:
     """Write the coefficients k + 1 of sin and cos(u/2) from the earlier ones and c[1] to c[k + 1]."""
     c, S, C = scratch.rotation, scratch.half_sine, scratch.half_cosine
     sine = 0.0
@@ -147,7 +147,7 @@ def write_half_angle_coefficients(scratch: Record, k: int) -> None:
 
 @inlined
 def compute_next_coefficient(
-    block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], k: int
+    block: Struct, settings: Struct, side: int, scratch: Struct, degrees: tuple[int, int], k: int
 ) -> float:
     """Compute c[k + 2] of an arc from the earlier coefficients, for the degrees of motion and weight."""
     if block.restrained:
@@ -159,7 +159,7 @@ def compute_next_coefficient(
 
 
 @inlined
-def write_variation_coefficients(variation: Record, damping: float, order: int) -> None:
+def write_variation_coefficients(variation: Struct, damping: float, order: int) -> None:
     """Write the coefficients 2 to ``order`` of x'' = stiffness x - damping x' + forcing into variation.change.
 
     The first two must be set beforehand.

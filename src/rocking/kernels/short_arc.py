@@ -29,7 +29,7 @@ from rocking.kernels.series import (
     has_negligible_truncation,
     sum_forcing,
 )
-from rocking.kernels.state import Record, StepOutcome
+from rocking.kernels.state import StepOutcome, Struct
 
 #: Largest lam t^2 of a linear step, lam |W| t^2 under a varying weight W, and (lam (|W| + |a|/g) + v^2) t^2 of a
 #: nonlinear step.
@@ -53,14 +53,14 @@ _CONVERGED = 1e-8
 
 
 @inlined
-def take_short_step(ground: Ground, block: Record, settings: Record, state: Record, h_max: float) -> StepEnd:
+def take_short_step(ground: Ground, block: Struct, settings: Struct, state: Struct, h_max: float) -> StepEnd:
     """Step to the next impact or by at most ``h_max``; UNDECIDED if the step is small or not simple."""
     end = take_nine_term_step(ground, block, settings, state, h_max)
     return create_undecided_step() if end.outcome == StepOutcome.STEP and end.time < _MIN_FRACTION * h_max else end
 
 
 @inlined
-def take_nine_term_step(ground: Ground, block: Record, settings: Record, state: Record, h_max: float) -> StepEnd:
+def take_nine_term_step(ground: Ground, block: Struct, settings: Struct, state: Struct, h_max: float) -> StepEnd:
     """Step to the next impact or by at most ``h_max``, as far as nine terms suffice."""
     if not is_piecewise_linear(ground) or block.restrained:
         return create_undecided_step()
@@ -76,7 +76,7 @@ def take_nine_term_step(ground: Ground, block: Record, settings: Record, state: 
 
 
 @not_inlined
-def take_short_weighted_step(ground: Ground, block: Record, settings: Record, state: Record, h_max: float) -> StepEnd:
+def take_short_weighted_step(ground: Ground, block: Struct, settings: Struct, state: Struct, h_max: float) -> StepEnd:
     """Compute a short step under varying weight."""
     lam = block.stiffness[state.side]
     weight = compute_weight(ground, state.piece, state.offset), coefficient(select_vertical(ground), state.piece, 1)
@@ -94,7 +94,7 @@ def take_short_weighted_step(ground: Ground, block: Record, settings: Record, st
 
 @inlined
 def take_short_nonlinear_step(
-    ground: Ground, block: Record, state: Record, h_max: float, weight: ValueAndSlope | None
+    ground: Ground, block: Struct, state: Struct, h_max: float, weight: ValueAndSlope | None
 ) -> StepEnd:
     """Compute a short step in the nonlinear model."""
     c, angles = compute_nonlinear_series(ground, block, state, weight)
@@ -155,7 +155,7 @@ def find_largest_weight(weight: ValueAndSlope | None, duration: float) -> float:
 
 
 @inlined
-def compute_linear_series(ground: Ground, block: Record, state: Record) -> RotationCoefficients:
+def compute_linear_series(ground: Ground, block: Struct, state: Struct) -> RotationCoefficients:
     """Compute the series of a linear arc under a ground acceleration that is linear in time."""
     side = state.side
     gain = block.restoring_gain[side]
@@ -167,7 +167,7 @@ def compute_linear_series(ground: Ground, block: Record, state: Record) -> Rotat
 
 @inlined
 def compute_weighted_series(
-    ground: Ground, block: Record, state: Record, weight: ValueAndSlope
+    ground: Ground, block: Struct, state: Struct, weight: ValueAndSlope
 ) -> RotationCoefficients:
     """Compute the series of a linear arc under two ground accelerations that are linear in time."""
     side, gain = state.side, block.restoring_gain[state.side]
@@ -178,7 +178,7 @@ def compute_weighted_series(
 
 @inlined
 def compute_nonlinear_series(
-    ground: Ground, block: Record, state: Record, weight: ValueAndSlope | None
+    ground: Ground, block: Struct, state: Struct, weight: ValueAndSlope | None
 ) -> tuple[RotationCoefficients, AngleSums]:
     """Compute the series of a nonlinear arc under ground accelerations that are linear in time."""
     side, u = state.side, state.u
@@ -190,14 +190,14 @@ def compute_nonlinear_series(
 
 
 @inlined
-def compute_push_line(ground: Ground, state: Record) -> ValueAndSlope:
+def compute_push_line(ground: Ground, state: Struct) -> ValueAndSlope:
     """Return the ground acceleration (linear in time) in the frame of the state's side, and its slope."""
     sign = side_sign(state.side)
     return sign * compute_acceleration(ground, state.piece, state.offset), sign * coefficient(ground, state.piece, 1)
 
 
 @inlined
-def resolve_step(c: RotationCoefficients, t: float, state: Record, overturn_angle: float) -> StepEnd:
+def resolve_step(c: RotationCoefficients, t: float, state: Struct, overturn_angle: float) -> StepEnd:
     """Return the end of a step of duration t, or its first impact; UNDECIDED if the bounds are inconclusive."""
     if c[1] == 0.0 and c[2] == 0.0:  # balanced, perhaps forever
         return create_undecided_step()

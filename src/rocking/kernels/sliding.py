@@ -38,7 +38,7 @@ from rocking.kernels.ground import (
     write_local_series,
 )
 from rocking.kernels.series import INTEGRATED_TWICE, write_angle_coefficients
-from rocking.kernels.state import ORDER, Record
+from rocking.kernels.state import ORDER, Struct
 
 #: First step after an impact, divided by the arc's duration under constant acceleration.
 _FIRST_STEP = 1.3
@@ -53,13 +53,13 @@ _MAX_SHORTENINGS = 60
 
 
 @inlined
-def compute_slip_stiffness(block: Record, side: int) -> float:
+def compute_slip_stiffness(block: Struct, side: int) -> float:
     """Return lam (1 + R^2/k^2), the rate of u'' while slipping."""
     return block.stiffness[side] * (1.0 + block.inertia_ratio[side])
 
 
 @inlined
-def compute_slip_restoring(block: Record, settings: Record, side: int, direction: float) -> float:
+def compute_slip_restoring(block: Struct, settings: Struct, side: int, direction: float) -> float:
     """Compute the restoring acceleration at zero rotation and weight 1 for a slip in the side's frame (Eq. 11)."""
     if not settings.nonlinear:
         return compute_slip_stiffness(block, side) * (block.slenderness[side] - direction * block.kinetic_friction)
@@ -68,7 +68,7 @@ def compute_slip_restoring(block: Record, settings: Record, side: int, direction
 
 
 @inlined
-def slides_flat(block: Record, side: int) -> bool:
+def slides_flat(block: Struct, side: int) -> bool:
     """Return whether a block on both pivots that slips towards a side does not tip."""
     return block.kinetic_friction <= block.threshold[side]
 
@@ -77,7 +77,7 @@ def slides_flat(block: Record, side: int) -> bool:
 
 
 @inlined
-def may_slip(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, end: StepEnd) -> bool:
+def may_slip(ground: Ground, block: Struct, settings: Struct, scratch: Struct, state: Struct, end: StepEnd) -> bool:
     """Return whether bounds do not exclude that the forces leave the cone of friction within a step; True for NaN."""
     side, h = state.side, end.time
     if is_piecewise_linear(ground) and not has_vertical(ground):
@@ -122,7 +122,7 @@ def may_slip(ground: Ground, block: Record, settings: Record, scratch: Record, s
 
 @not_inlined
 def find_slip(
-    ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h_max: float
+    ground: Ground, block: Struct, settings: Struct, scratch: Struct, state: Struct, h_max: float
 ) -> tuple[int, float, float, int]:
     """Find the first time in a step at which the forces leave the cone of friction; inf if they do not.
 
@@ -144,7 +144,7 @@ def find_slip(
 
 @inlined
 def write_contact_series(
-    ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, degree: int, order: int
+    ground: Ground, block: Struct, settings: Struct, scratch: Struct, state: Struct, degree: int, order: int
 ) -> None:
     """Write the series of the horizontal and the normal force without slip into scratch.slip and scratch.normal."""
     c, q, arm = scratch.rotation, scratch.squares, block.arm[state.side]
@@ -165,7 +165,7 @@ def write_contact_series(
 
 
 @inlined
-def write_square(scratch: Record, n: int) -> None:
+def write_square(scratch: Struct, n: int) -> None:
     """Write coefficient n of the square of the rate into scratch.squares."""
     c = scratch.rotation
     value = 0.0
@@ -179,7 +179,7 @@ def write_square(scratch: Record, n: int) -> None:
 
 @not_inlined
 def expand_slip(
-    ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h_max: float
+    ground: Ground, block: Struct, settings: Struct, scratch: Struct, state: Struct, h_max: float
 ) -> tuple[int, float]:
     """Write the series of slide-rock from a state into scratch; return (order, step), the step at most ``h_max``.
 
@@ -222,7 +222,7 @@ def expand_slip(
 
 @inlined
 def write_slip_coefficients(
-    block: Record, settings: Record, side: int, scratch: Record, direction: float, n: int, push: float, weight: float
+    block: Struct, settings: Struct, side: int, scratch: Struct, direction: float, n: int, push: float, weight: float
 ) -> None:
     """Write c[n + 2] and V[n + 1] of slide-rock from the earlier coefficients."""
     c, V, q = scratch.rotation, scratch.slip, scratch.squares
@@ -258,7 +258,7 @@ def write_slip_coefficients(
 
 
 @inlined
-def shorten_slip(block: Record, scratch: Record, h: float) -> float:
+def shorten_slip(block: Struct, scratch: Struct, h: float) -> float:
     """Return a step, at most h, within which the last terms of both series are negligible."""
     c, V = scratch.rotation, scratch.slip
     for _ in range(_MAX_SHORTENINGS):
@@ -287,7 +287,7 @@ def ignore_rounding_at_start(velocity: Floats) -> None:
 
 
 @not_inlined
-def find_slip_end(scratch: Record, order: int, h: float, direction: float) -> tuple[float, float]:
+def find_slip_end(scratch: Struct, order: int, h: float, direction: float) -> tuple[float, float]:
     """Find the first times in [0, h) at which slide-rock sticks, and at which contact is lost; inf if never."""
     d = scratch.auxiliary
     for k in range(order):
@@ -300,7 +300,7 @@ def find_slip_end(scratch: Record, order: int, h: float, direction: float) -> tu
 
 
 @inlined
-def move_slip(scratch: Record, state: Record, degree: int, sign: float, t: float) -> None:
+def move_slip(scratch: Struct, state: Struct, degree: int, sign: float, t: float) -> None:
     """Move the displacement and the velocity of the foot along the series in scratch.slip, in a frame of some sign."""
     distance, velocity = integrate_slip(scratch, degree, t)
     state.slip += sign * distance
@@ -309,7 +309,7 @@ def move_slip(scratch: Record, state: Record, degree: int, sign: float, t: float
 
 
 @inlined
-def integrate_slip(scratch: Record, degree: int, t: float) -> tuple[float, float]:
+def integrate_slip(scratch: Struct, degree: int, t: float) -> tuple[float, float]:
     """Return the distance until t, and the velocity at t, of the series in scratch.slip."""
     V = scratch.slip
     distance, velocity = V[degree] / (degree + 1), V[degree]
@@ -320,7 +320,7 @@ def integrate_slip(scratch: Record, degree: int, t: float) -> tuple[float, float
 
 
 @not_inlined
-def expand_slide(ground: Ground, block: Record, scratch: Record, state: Record) -> int:
+def expand_slide(ground: Ground, block: Struct, scratch: Struct, state: Struct) -> int:
     """Write the series of the velocity of a block that slides on both pivots into scratch.slip; return its degree."""
     A, W, V = scratch.ground, scratch.weight, scratch.slip
     degree = write_local_series(ground, state.piece, state.offset, 1.0, A)
@@ -333,7 +333,7 @@ def expand_slide(ground: Ground, block: Record, scratch: Record, state: Record) 
 
 @inlined
 def find_slide_end(
-    ground: Ground, block: Record, scratch: Record, state: Record, degree: int, h: float
+    ground: Ground, block: Struct, scratch: Struct, state: Struct, degree: int, h: float
 ) -> tuple[float, float, float]:
     """Find the length of a step of slide, and the times in it at which it ends and contact is lost; inf if never."""
     d = scratch.auxiliary
@@ -355,7 +355,7 @@ def find_slide_end(
 
 
 @inlined
-def compute_slip_factor(block: Record, side: int, e: float, direction: float) -> float:
+def compute_slip_factor(block: Struct, side: int, e: float, direction: float) -> float:
     """Compute the factor on the speed of an impact that leaves a side and slips; ``direction`` is the slip's sign."""
     other = 1 - side
     h, d, next_d = block.height, block.pivot_distance[side], block.pivot_distance[other]
@@ -367,7 +367,7 @@ def compute_slip_factor(block: Record, side: int, e: float, direction: float) ->
 
 
 @not_inlined
-def strike_with_friction(block: Record, state: Record, side: int, speed: float) -> None:
+def strike_with_friction(block: Struct, state: Struct, side: int, speed: float) -> None:
     """Change speed, slip and mode at an impact that has left a side and would stick with the speed of the state."""
     other = 1 - side
     j, h, d, next_d = side_sign(other), block.height, block.pivot_distance[side], block.pivot_distance[other]
@@ -392,7 +392,7 @@ def strike_with_friction(block: Record, state: Record, side: int, speed: float) 
 
 
 @inlined
-def find_sticking_friction(block: Record, side: int) -> float:
+def find_sticking_friction(block: Struct, side: int) -> float:
     """Compute the friction with which an impact that leaves a side sticks if nothing slips before (Eq. 7)."""
     e = block.restitution[side]
     return block.height * (1.0 - e) / (block.pivot_distance[1 - side] * e + block.pivot_distance[side])
@@ -400,7 +400,7 @@ def find_sticking_friction(block: Record, side: int) -> float:
 
 @inlined
 def sum_slip_of_sequence(
-    block: Record, settings: Record, state: Record, g: float, other_g: float
+    block: Struct, settings: Struct, state: Struct, g: float, other_g: float
 ) -> tuple[float, float]:
     """Return changes of velocity and displacement of the foot at the end of a sequence of impacts while sliding.
 
@@ -426,7 +426,7 @@ def sum_slip_of_sequence(
 
 
 @inlined
-def settle_slip(block: Record, state: Record) -> None:
+def settle_slip(block: Struct, state: Struct) -> None:
     """Set the mode of a block without rotation: at rest, sliding, or slipping on the pivot over which it tips."""
     if state.direction != 0 and not slides_flat(block, 0 if state.direction > 0 else 1):
         state.side = 0 if state.direction > 0 else 1

@@ -1,6 +1,6 @@
-"""Records on which kernels operate, integer codes that they return, and rows that a march writes.
+"""Structs on which kernels operate, integer codes that they return, and rows that a march writes.
 
-Compiled code passes records by pointer, reads fields by name, and treats codes as plain integers.
+Compiled code passes structs by pointer, reads fields by name, and treats codes as plain integers.
 """
 
 import math
@@ -14,10 +14,10 @@ from rocking.core.arrays import Integers
 from rocking.kernels.compiled import UNCOMPILED, inlined
 from rocking.kernels.ground import Ground, piece_start
 
-Records = NDArray[np.void]
+Structs = NDArray[np.void]
 
-#: Single record of one of the types below.
-Record = Any
+#: Single struct of one of the types below.
+Struct = Any
 
 #: Highest power in an arc's series, sufficient for steps of 1/p in full double precision.
 ORDER = 22
@@ -82,7 +82,7 @@ class RestRule(IntEnum):
     BYPASS = 4
 
 
-class Ending(IntEnum):
+class MarchStatus(IntEnum):
     """Reason why a march ended; RUNNING, FULL and PAUSED marches can be continued."""
 
     DONE = 0
@@ -102,8 +102,8 @@ class Ending(IntEnum):
     LOST = 8
 
 
-def define_record(**fields: Any) -> np.dtype[np.void]:
-    """Return the type of a record with these fields, at the same offsets on every platform.
+def define_struct(**fields: Any) -> np.dtype[np.void]:
+    """Return the type of a struct with these fields, at the same offsets on every platform.
 
     They are those of a C struct whose numbers are aligned to their sizes. Some 32-bit platforms align numbers of eight
     bytes to four.
@@ -122,9 +122,9 @@ def define_record(**fields: Any) -> np.dtype[np.void]:
 _SIDES = ("f8", (2,))
 _SERIES = ("f8", (ORDER + 2,))
 
-#: Body. Fields of two numbers refer to side + and side -; accelerations are in units of g. In all records the most used
+#: Body. Fields of two numbers refer to side + and side -; accelerations are in units of g. In all structs the most used
 #: fields come first, so that fewer cache lines are read.
-BLOCK_DTYPE = define_record(
+BLOCK_DTYPE = define_struct(
     stiffness=_SIDES,  # lambda in u'' = lambda u - ..., 1/s^2
     restoring_gain=_SIDES,  # restoring acceleration at zero rotation per acceleration above the threshold
     threshold=_SIDES,  # ground acceleration at uplift without restraints
@@ -170,17 +170,17 @@ BLOCK_DTYPE = define_record(
 )
 
 #: Settings of the computation.
-SETTINGS_DTYPE = define_record(
+SETTINGS_DTYPE = define_struct(
     nonlinear="?",  # whether the model is nonlinear
     rest_rule="i8",  # `RestRule` that ends chattering
     tolerance="f8",  # largest accepted width of a bracket on the time of rest, s
-    stop="f8",  # time at which to stop, s
+    stop_time="f8",  # time at which to stop, s
     no_end_time="?",  # whether the stop time is infinite
     writes_tables="?",  # whether to write the tables, or only the state
 )
 
 #: State of a march.
-STATE_DTYPE = define_record(
+STATE_DTYPE = define_struct(
     piece="i8",  # present piece of the motion
     offset="f8",  # time since the start of the piece, s
     side="i8",  # 0 for side +, 1 for side -; negative at rest
@@ -193,7 +193,7 @@ STATE_DTYPE = define_record(
     certificate_speed="f8",  # speed below which another proof is attempted
     last_impact_time="f8",  # time of the last impact or uplift, s
     impacts="i8",  # number of impacts so far
-    ending="i8",  # an `Ending`
+    status="i8",  # a `MarchStatus`
     continuous_uplift="?",  # whether the body has just been lifted without a jump
     peak_time="f8",  # time of the largest rotation, s
     sequence_start="f8",  # time since which chattering is proven, s
@@ -220,7 +220,7 @@ STATE_DTYPE = define_record(
 )
 
 #: Step of a response: state at its start (see `STATE_DTYPE`) and time, for `expand_arc`.
-NODE_DTYPE = define_record(
+NODE_DTYPE = define_struct(
     time="f8",
     piece="i8",
     offset="f8",
@@ -234,20 +234,20 @@ NODE_DTYPE = define_record(
 )
 
 #: Impact: time, side entered (+1 or -1), speeds before and after.
-IMPACT_DTYPE = define_record(time="f8", side="i8", speed_before="f8", speed_after="f8")
+IMPACT_DTYPE = define_struct(time="f8", side="i8", speed_before="f8", speed_after="f8")
 
 #: Event: time, `EventKind`, side (+1 or -1; 0 at rest).
-EVENT_DTYPE = define_record(time="f8", kind="i8", side="i8")
+EVENT_DTYPE = define_struct(time="f8", kind="i8", side="i8")
 
 #: Chattering sequence: time since which it is proven, time of rest with bounds, number of impacts in between.
-SEQUENCE_DTYPE = define_record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8")
+SEQUENCE_DTYPE = define_struct(start="f8", end="f8", lower="f8", upper="f8", impacts="i8")
 
 #: Row k contains the k-th node, impact, event and chattering sequence of a march: one array, because kernels pass
 #: arrays by value.
-TABLE_DTYPE = define_record(node=NODE_DTYPE, impact=IMPACT_DTYPE, event=EVENT_DTYPE, sequence=SEQUENCE_DTYPE)
+TABLE_DTYPE = define_struct(node=NODE_DTYPE, impact=IMPACT_DTYPE, event=EVENT_DTYPE, sequence=SEQUENCE_DTYPE)
 
 #: Scratch space: series of one step about its start.
-SCRATCH_DTYPE = define_record(
+SCRATCH_DTYPE = define_struct(
     rotation=_SERIES,  # u
     ground=_SERIES,  # push: acceleration of the ground in the frame of the side, in units of g
     weight=_SERIES,  # weight divided by the weight at rest
@@ -265,44 +265,44 @@ SCRATCH_DTYPE = define_record(
 )
 
 #: Scratch space of a variation: series of the stiffness, the forcing and the variation itself.
-VARIATION_DTYPE = define_record(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)
+VARIATION_DTYPE = define_struct(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)
 
 
-def create_records(count: int, kind: np.dtype[np.void]) -> Records:
-    """Return zeroed records."""
+def create_structs(count: int, kind: np.dtype[np.void]) -> Structs:
+    """Return zeroed structs."""
     return expose_fields(np.zeros(count, dtype=kind))
 
 
-def expose_fields(array: Records) -> Records:
+def expose_fields(array: Structs) -> Structs:
     """Let kernels that Python runs read fields as attributes, which is slow elsewhere."""
     return array.view(np.recarray) if UNCOMPILED else array
 
 
-def replace_records(records: Records, indices: Integers, values: Records) -> None:
-    """Replace some of the records (assignment would copy field by field, which takes 15 times as long)."""
-    raw = np.dtype((np.void, records.itemsize))
-    records.view(raw)[indices] = values.view(raw)
+def replace_structs(structs: Structs, indices: Integers, values: Structs) -> None:
+    """Replace some of the structs (assignment would copy field by field, which takes 15 times as long)."""
+    raw = np.dtype((np.void, structs.itemsize))
+    structs.view(raw)[indices] = values.view(raw)
 
 
-def create_record(kind: np.dtype[np.void], **values: Any) -> Record:
-    """Return one record with these values."""
-    row = create_records(1, kind)[0]
+def create_struct(kind: np.dtype[np.void], **values: Any) -> Struct:
+    """Return one struct with these values."""
+    row = create_structs(1, kind)[0]
     for name, value in values.items():
         row[name] = value
     return row
 
 
-def create_states(count: int, budget: int) -> Records:
+def create_states(count: int, budget: int) -> Structs:
     """Return states of blocks at rest at time zero that march to the end of the motion."""
-    states = create_records(count, STATE_DTYPE)
+    states = create_structs(count, STATE_DTYPE)
     states["side"] = AT_REST
     states["stop_piece"] = NO_STOP_PIECE
-    states["ending"] = Ending.RUNNING.value
+    states["status"] = MarchStatus.RUNNING.value
     states["budget"] = budget
     return states
 
 
-def create_state_at_node(node: Record, plastic_elongation: float = 0.0, budget: int = np.iinfo(np.int64).max) -> Record:
+def create_state_at_node(node: Struct, plastic_elongation: float = 0.0, budget: int = np.iinfo(np.int64).max) -> Struct:
     """Return the state of a march that starts at a node, with the plastic elongation of a tendon there."""
     state = create_states(1, budget)[0]
     for name in ("piece", "offset", "side", "u", "v", "tendon_law", "slip", "slip_rate", "direction"):
@@ -311,17 +311,17 @@ def create_state_at_node(node: Record, plastic_elongation: float = 0.0, budget: 
     return state
 
 
-def create_scratch() -> Record:
+def create_scratch() -> Struct:
     """Return scratch space for one march at a time."""
-    return create_record(SCRATCH_DTYPE)
+    return create_struct(SCRATCH_DTYPE)
 
 
-def create_table(rows: int) -> Records:
+def create_table(rows: int) -> Structs:
     """Return a table with empty rows."""
-    return create_records(rows, TABLE_DTYPE)
+    return create_structs(rows, TABLE_DTYPE)
 
 
-def enlarge_table(table: Records) -> Records:
+def enlarge_table(table: Structs) -> Structs:
     """Return a table with the same rows followed by as many empty ones."""
     return expose_fields(np.concatenate([table, np.zeros_like(table)]))
 
@@ -334,7 +334,7 @@ _ROWS_PER_ITERATION = PROVEN_PER_ITERATION + 3
 
 
 @inlined
-def has_space(settings: Record, table: Records, state: Record) -> bool:
+def has_space(settings: Struct, table: Structs, state: Struct) -> bool:
     """Return whether the table has space for one iteration of the march."""
     max_rows = max(max(state.nodes, state.impacts), max(state.events, state.sequences))
     return not settings.writes_tables or max_rows + _ROWS_PER_ITERATION <= table.shape[0]
@@ -347,7 +347,7 @@ def signed_side(side: int) -> int:
 
 
 @inlined
-def encode_resting_side(block: Record, side: int) -> int:
+def encode_resting_side(block: Struct, side: int) -> int:
     """Return the side of a body at rest on a side, which identifies one of two facing stops."""
     return -1 - side if block.two_stops else AT_REST
 
@@ -359,7 +359,7 @@ def find_stop_of_resting_side(resting: int) -> int:
 
 
 @inlined
-def write_node(ground: Ground, settings: Record, table: Records, state: Record) -> None:
+def write_node(ground: Ground, settings: Struct, table: Structs, state: Struct) -> None:
     """Write the state."""
     if not settings.writes_tables:
         return
@@ -378,7 +378,7 @@ def write_node(ground: Ground, settings: Record, table: Records, state: Record) 
 
 
 @inlined
-def write_event(settings: Record, table: Records, state: Record, time: float, kind: int) -> None:
+def write_event(settings: Struct, table: Structs, state: Struct, time: float, kind: int) -> None:
     """Write an uplift, rest or overturning."""
     if settings.writes_tables:
         row = table[state.events].event
@@ -389,7 +389,7 @@ def write_event(settings: Record, table: Records, state: Record, time: float, ki
 
 
 @inlined
-def write_impact(settings: Record, table: Records, state: Record, time: float, speed: float) -> None:
+def write_impact(settings: Struct, table: Structs, state: Struct, time: float, speed: float) -> None:
     """Write the last impact, from the state after it and the speed before."""
     if not settings.writes_tables:
         return
@@ -402,7 +402,7 @@ def write_impact(settings: Record, table: Records, state: Record, time: float, s
 
 @inlined
 def write_sequence(
-    settings: Record, table: Records, state: Record, time: float, bounds: tuple[float, float, float]
+    settings: Struct, table: Structs, state: Struct, time: float, bounds: tuple[float, float, float]
 ) -> None:
     """Write a finished chattering sequence.
 

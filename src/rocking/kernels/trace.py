@@ -26,19 +26,19 @@ from rocking.kernels.ground import (
 from rocking.kernels.restraints import apply_tendon_law, find_tendon_law_at_rest, update_plastic_elongation
 from rocking.kernels.series import INTEGRATED_TWICE, write_variation_coefficients
 from rocking.kernels.sliding import expand_slide, expand_slip, integrate_slip
-from rocking.kernels.state import NODE_DTYPE, Record, Records, TendonLaw, create_records
+from rocking.kernels.state import NODE_DTYPE, Struct, Structs, TendonLaw, create_structs
 
 #: Nodes of a response before its march.
-NO_NODES = create_records(0, NODE_DTYPE)
+NO_NODES = create_structs(0, NODE_DTYPE)
 
 
 class Trail(NamedTuple):
     """Problem and nodes of a response, sufficient to recompute it."""
 
     ground: Ground  # motion
-    block: Record  # body
-    settings: Record  # settings of the computation
-    nodes: Records  # states at the starts of all steps
+    block: Struct  # body
+    settings: Struct  # settings of the computation
+    nodes: Structs  # states at the starts of all steps
 
 
 def copy_trail(trail: Trail) -> Trail:
@@ -54,7 +54,7 @@ _ROTATION, _VELOCITY, _ACCELERATION, _SLIP, _SLIP_VELOCITY = 0, 1, 2, 3, 4
 
 
 @kernel
-def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Floats) -> None:
+def trace(trail: Trail, scratch: Struct, times: Floats, rows: Integers, out: Floats) -> None:
     """Write theta, theta', theta'' at times[k], in the step that starts at trail.nodes[rows[k]], into out[k].
 
     They are zero from the end of the last resolved arc to rest or the end of the response, and meaningless for NaN.
@@ -103,7 +103,7 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
 
 
 @not_inlined
-def expand_step(trail: Trail, scratch: Record, node: Record, duration: float) -> tuple[int, float]:
+def expand_step(trail: Trail, scratch: Struct, node: Struct, duration: float) -> tuple[int, float]:
     """Write the series of the step from a node, with or without slip, into scratch; return (order, step)."""
     if node.direction != 0:
         return expand_slip(trail.ground, trail.block, trail.settings, scratch, node, duration)
@@ -113,7 +113,7 @@ def expand_step(trail: Trail, scratch: Record, node: Record, duration: float) ->
 
 @not_inlined
 def write_slip(
-    trail: Trail, scratch: Record, row: int, order: int, elapsed: float, landing: float, out: Floats
+    trail: Trail, scratch: Struct, row: int, order: int, elapsed: float, landing: float, out: Floats
 ) -> None:
     """Write displacement and velocity of the foot in a step, whose series to ``order`` are in scratch if it rocks.
 
@@ -167,8 +167,8 @@ _MIN_JUMP_EXCESS = 1e-9
 @kernel
 def compute_variation(
     trail: Trail,
-    scratch: Record,
-    variation: Record,
+    scratch: Struct,
+    variation: Struct,
     quantity: int,
     times: Floats,
     changes: Floats,
@@ -234,7 +234,7 @@ def compute_variation(
 
 @inlined
 def vary_uplift(
-    trail: Trail, node: Record, next_node: Record, quantity: int, tendon_change: float, shift_of_rest: float
+    trail: Trail, node: Struct, next_node: Struct, quantity: int, tendon_change: float, shift_of_rest: float
 ) -> tuple[float, float]:
     """Compute shift and velocity variation of an uplift after a rest whose start shifts by ``shift_of_rest``."""
     if next_node.time > node.time or node.time == trail.nodes[0].time:
@@ -256,9 +256,9 @@ def count_times_until(times: Floats, count: int, last: float) -> int:
 @not_inlined
 def write_changes(
     trail: Trail,
-    scratch: Record,
-    variation: Record,
-    node: Record,
+    scratch: Struct,
+    variation: Struct,
+    node: Struct,
     order: int,
     times: Floats,
     changes: Floats,
@@ -297,7 +297,7 @@ def differentiate_start_plasticity(trail: Trail) -> float:
 
 
 @inlined
-def is_impact(nodes: Records, k: int) -> bool:
+def is_impact(nodes: Structs, k: int) -> bool:
     """Return whether the step from the k-th node ends in an impact, and not in a contact without speed."""
     node, next_node = nodes[k], nodes[k + 1]
     if node.side < 0 or next_node.side < 0 or next_node.u != 0.0:
@@ -307,7 +307,7 @@ def is_impact(nodes: Records, k: int) -> bool:
 
 
 @inlined
-def compute_step_duration(trail: Trail, node: Record, next_node: Record) -> float:
+def compute_step_duration(trail: Trail, node: Struct, next_node: Struct) -> float:
     """Compute the length of a step without the rounding of absolute times."""
     if next_node.piece == node.piece:
         return next_node.offset - node.offset
@@ -318,7 +318,7 @@ def compute_step_duration(trail: Trail, node: Record, next_node: Record) -> floa
 
 @not_inlined
 def expand_variation(
-    trail: Trail, scratch: Record, variation: Record, node: Record, quantity: int, start: Variations, duration: float
+    trail: Trail, scratch: Struct, variation: Struct, node: Struct, quantity: int, start: Variations, duration: float
 ) -> int:
     """Write the series of the variation along the arc from a node into ``variation.change``, and return its order.
 
@@ -349,7 +349,7 @@ def expand_variation(
 
 
 @inlined
-def expand_derivatives(trail: Trail, scratch: Record, variation: Record, side: int, degree: int, order: int) -> None:
+def expand_derivatives(trail: Trail, scratch: Struct, variation: Struct, side: int, degree: int, order: int) -> None:
     """Write the series of d u''/d u without `add_restraints`, and of u'' per change of the motion, to ``variation``.
 
     This removes the contribution of restraints from the motion in scratch.
@@ -385,7 +385,7 @@ def expand_derivatives(trail: Trail, scratch: Record, variation: Record, side: i
 
 
 @inlined
-def add_restraints(trail: Trail, scratch: Record, variation: Record, side: int, order: int) -> None:
+def add_restraints(trail: Trail, scratch: Struct, variation: Struct, side: int, order: int) -> None:
     """Add the contribution of prestress and springs to d u''/d u, after `expand_derivatives`."""
     variation.stiffness[0] -= trail.block.spring[side]
     if trail.settings.nonlinear and trail.block.prestress[side] != 0.0:
@@ -394,7 +394,7 @@ def add_restraints(trail: Trail, scratch: Record, variation: Record, side: int, 
 
 
 @inlined
-def expand_unforced(trail: Trail, scratch: Record, variation: Record, side: int, degree: int, order: int) -> None:
+def expand_unforced(trail: Trail, scratch: Struct, variation: Struct, side: int, degree: int, order: int) -> None:
     """Write the series of d u''/d u without forcing to ``variation``."""
     expand_derivatives(trail, scratch, variation, side, degree, order)
     for k in range(order - 1):
@@ -412,7 +412,7 @@ def select_motion_weight(W: Floats, k: int, weight_degree: int) -> float:
 
 @inlined
 def compute_saltation(
-    trail: Trail, node: Record, next_node: Record, quantity: int, shift: float, rates: tuple[float, float], number: int
+    trail: Trail, node: Struct, next_node: Struct, quantity: int, shift: float, rates: tuple[float, float], number: int
 ) -> tuple[float, float]:
     """Compute the variation after an impact that shifts; ``rates``: velocity variation before it, and impact speed.
 
@@ -432,7 +432,7 @@ def compute_saltation(
 
 
 @inlined
-def compute_uplift_shift(trail: Trail, node: Record, quantity: int, tendon_change: float) -> float:
+def compute_uplift_shift(trail: Trail, node: Struct, quantity: int, tendon_change: float) -> float:
     """Compute the shift of the uplift of a node; ``tendon_change``: see `vary_tendon_restoring`."""
     ground, block, settings, _ = trail
     threshold = block.threshold[node.side]
@@ -453,7 +453,7 @@ def compute_uplift_shift(trail: Trail, node: Record, quantity: int, tendon_chang
 
 
 @inlined
-def is_jump(trail: Trail, node: Record) -> bool:
+def is_jump(trail: Trail, node: Struct) -> bool:
     """Return whether the motion jumps past the threshold at the uplift of a node."""
     threshold, restraint = trail.block.threshold[node.side], trail.block.restraint_threshold[node.side]
     push = -compute_side_push(trail.ground, trail.block, node.side, node.piece, node.offset)
@@ -461,7 +461,7 @@ def is_jump(trail: Trail, node: Record) -> bool:
 
 
 @inlined
-def vary_tendon_restoring(block: Record, side: int, plastic_elongation: float, change: float) -> float:
+def vary_tendon_restoring(block: Struct, side: int, plastic_elongation: float, change: float) -> float:
     """Compute the effect of a change of plastic elongation on the restoring acceleration at zero rotation."""
     if not block.yielding or find_tendon_law_at_rest(block, plastic_elongation) == TendonLaw.SLACK:
         return 0.0
@@ -469,14 +469,14 @@ def vary_tendon_restoring(block: Record, side: int, plastic_elongation: float, c
 
 
 @inlined
-def compute_side_push(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
+def compute_side_push(ground: Ground, block: Struct, side: int, piece: int, offset: float) -> float:
     """Compute the acceleration towards a side plus the weight's contribution to its threshold."""
     added = compute_weight(ground, piece, offset) - 1.0
     return side_sign(side) * compute_acceleration(ground, piece, offset) + block.threshold[side] * added
 
 
 @inlined
-def compute_push_rate(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
+def compute_push_rate(ground: Ground, block: Struct, side: int, piece: int, offset: float) -> float:
     """Compute the rate of `compute_side_push`."""
     vertical = compute_acceleration_rate(select_vertical(ground), piece, offset) if has_vertical(ground) else 0.0
     return side_sign(side) * compute_acceleration_rate(ground, piece, offset) + block.threshold[side] * vertical
@@ -484,7 +484,7 @@ def compute_push_rate(ground: Ground, block: Record, side: int, piece: int, offs
 
 @inlined
 def compute_rest_shift(
-    trail: Trail, node: Record, quantity: int, changes: tuple[float, float, float, float], rest: Record
+    trail: Trail, node: Struct, quantity: int, changes: tuple[float, float, float, float], rest: Struct
 ) -> float:
     """Compute the shift of the rest that follows an impact, to first order in the speed (the paper's Eq. 75).
 
@@ -513,7 +513,7 @@ def compute_rest_shift(
 
 
 @inlined
-def compute_restoring_shift(trail: Trail, node: Record, j: int, quantity: int, shift: float) -> float:
+def compute_restoring_shift(trail: Trail, node: Struct, j: int, quantity: int, shift: float) -> float:
     """Compute the change of a restoring acceleration at an impact that shifts."""
     ground, block, settings, _ = trail
     motion = compute_acceleration(ground, node.piece, node.offset)

@@ -26,7 +26,7 @@ from rocking.kernels.ground import (
     write_local_series,
 )
 from rocking.kernels.restraints import apply_tendon_law, update_plastic_elongation
-from rocking.kernels.state import AT_REST, Record, Records, find_stop_of_resting_side
+from rocking.kernels.state import AT_REST, Struct, Structs, find_stop_of_resting_side
 from rocking.kernels.trace import Trail
 
 
@@ -40,14 +40,14 @@ class Uplift(NamedTuple):
 
 
 @inlined
-def find_threshold(block: Record, side: int) -> float:
+def find_threshold(block: Struct, side: int) -> float:
     """Return the threshold of a side, of an uplift or of a slip."""
     return min(block.threshold[side], block.static_friction) if block.has_friction else block.threshold[side]
 
 
 @not_inlined
 def find_next_uplift(
-    ground: Ground, block: Record, scratch: Record, resting: int, piece: int, offset: float, stop: float
+    ground: Ground, block: Struct, scratch: Struct, resting: int, piece: int, offset: float, stop: float
 ) -> Uplift:
     """Find the first instant from (piece, offset) at which the motion passes a threshold of a body at rest.
 
@@ -88,7 +88,7 @@ def find_next_uplift(
 
 
 @kernel
-def write_next_uplifts(trail: Trail, scratch: Record, times: Floats) -> None:
+def write_next_uplifts(trail: Trail, scratch: Struct, times: Floats) -> None:
     """Write the time of the next uplift from each node at rest, or inf if there is none.
 
     The law of a tendon that yields changes in the block of the trail.
@@ -101,12 +101,12 @@ def write_next_uplifts(trail: Trail, scratch: Record, times: Floats) -> None:
             plastic_elongation = update_plastic_elongation(block, settings, nodes, k, plastic_elongation)
             apply_tendon_law(block, node.tendon_law, plastic_elongation)
         if node.side < 0:
-            uplift = find_next_uplift(ground, block, scratch, node.side, node.piece, node.offset, settings.stop)
+            uplift = find_next_uplift(ground, block, scratch, node.side, node.piece, node.offset, settings.stop_time)
             times[k] = piece_start(ground, uplift.piece) + uplift.offset if uplift.side != AT_REST else np.inf
 
 
 @inlined
-def find_uplift_side(ground: Ground, block: Record, piece: int, offset: float, h: float, A: Floats, d: Floats) -> int:
+def find_uplift_side(ground: Ground, block: Struct, piece: int, offset: float, h: float, A: Floats, d: Floats) -> int:
     """Return the side of an uplift of a body that rests on both: the side whose threshold is exceeded by more within h.
 
     With a positive weight, it is the side whose threshold is passed. Without, both are passed at instants that differ
@@ -118,7 +118,7 @@ def find_uplift_side(ground: Ground, block: Record, piece: int, offset: float, h
 
 
 @inlined
-def is_side_uncertain(ground: Ground, block: Record, piece: int, offset: float, h: float, A: Floats, d: Floats) -> bool:
+def is_side_uncertain(ground: Ground, block: Struct, piece: int, offset: float, h: float, A: Floats, d: Floats) -> bool:
     """Return whether the push has negligible leading terms, so that rounding decides the side without weight."""
     degree = write_threshold_difference(ground, block, piece, offset, A, d)
     negligible_terms = 0.0
@@ -128,7 +128,7 @@ def is_side_uncertain(ground: Ground, block: Record, piece: int, offset: float, 
 
 
 @inlined
-def write_threshold_difference(ground: Ground, block: Record, piece: int, offset: float, A: Floats, d: Floats) -> int:
+def write_threshold_difference(ground: Ground, block: Struct, piece: int, offset: float, A: Floats, d: Floats) -> int:
     """Write half the difference of the excess over both thresholds (side - minus side +) into A; return its degree.
 
     Without restraints this is the horizontal motion, even for unequal sides: both thresholds vanish with the weight.
@@ -184,9 +184,9 @@ def write_completeness(
     grounds: Grounds,
     motions: Integers,
     factors: Floats,
-    blocks: Records,
-    states: Records,
-    scratch: Record,
+    blocks: Structs,
+    states: Structs,
+    scratch: Struct,
     complete: Flags,
 ) -> None:
     """Write whether the chattering after the first uplift was complete, for each block that started at rest."""
@@ -197,7 +197,7 @@ def write_completeness(
 
 
 @inlined
-def exceeds_threshold_again(ground: Ground, block: Record, scratch: Record, state: Record) -> bool:
+def exceeds_threshold_again(ground: Ground, block: Struct, scratch: Struct, state: Struct) -> bool:
     """Return whether the motion, after an uplift and a return within the thresholds, passes one before the rest."""
     rest_time = state.first_rest
     uplift = find_next_uplift(
@@ -224,7 +224,7 @@ def find_piece_before(ground: Ground, time: float) -> int:
 
 
 @inlined
-def find_return(ground: Ground, block: Record, scratch: Record, uplift: Uplift) -> tuple[int, float]:
+def find_return(ground: Ground, block: Struct, scratch: Struct, uplift: Uplift) -> tuple[int, float]:
     """Return the piece and offset from which the motion exceeds neither threshold.
 
     The motion may jump from one threshold to the other and, without a positive weight, exceed both.
@@ -246,7 +246,7 @@ def find_return(ground: Ground, block: Record, scratch: Record, uplift: Uplift) 
 
 @inlined
 def measure_time_above_threshold(
-    ground: Ground, block: Record, scratch: Record, piece: int, offset: float, side: int
+    ground: Ground, block: Struct, scratch: Struct, piece: int, offset: float, side: int
 ) -> float:
     """Return the time for which the motion exceeds a threshold within a piece; inf if to its end."""
     sign, threshold = 1.0 if side == 1 else -1.0, find_threshold(block, side)

@@ -14,7 +14,7 @@ from rocking.errors import OptionError
 from rocking.kernels import state
 from rocking.kernels.adjoint import AdjointEnd, adjoint, differentiate_step_end
 from rocking.kernels.march import march
-from rocking.kernels.state import Records
+from rocking.kernels.state import Structs
 from rocking.kernels.trace import Trail, copy_trail
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
@@ -249,17 +249,17 @@ def _target_time(response: Response, quantity: GradientTarget, index: float | No
     return _Target(instant, instant, trail, row, elapsed)
 
 
-def _find_later_nodes(response: Response, row: int, until: float) -> Records:
+def _find_later_nodes(response: Response, row: int, until: float) -> Structs:
     """Return the nodes after a row up to a time, including impacts after a proof."""
-    nodes: Records = response._history.trail.nodes
-    later: Records = nodes[(nodes["time"] > response.solution.trail.nodes["time"][row]) & (nodes["time"] <= until)]
+    nodes: Structs = response._history.trail.nodes
+    later: Structs = nodes[(nodes["time"] > response.solution.trail.nodes["time"][row]) & (nodes["time"] <= until)]
     return later
 
 
 def _has_ties_before(trail: Trail, instant: float) -> bool:
     """Return whether rounding determined a touch up to an instant, by integrating again."""
     settings, start = trail.settings.copy(), state.create_state_at_node(trail.nodes[0])
-    settings["stop"], settings["no_end_time"], settings["writes_tables"] = (
+    settings["stop_time"], settings["no_end_time"], settings["writes_tables"] = (
         math.nextafter(instant, math.inf),
         False,
         False,
@@ -272,24 +272,24 @@ def _apply_adjoint(target: _Target, by_state: Floats, derivatives: Floats) -> st
     """Write derivatives by the initial state and by pieces of the motion; return the reason if there are none."""
     nodes, scratch = target.trail.nodes, state.create_scratch()
     starts_at_rest, start_time = int(nodes["side"][0]) < 0, float(nodes["time"][0])
-    ending = AdjointEnd.START
+    status = AdjointEnd.START
     if target.by_state is None:
         trail = copy_trail(target.trail)
-        ending = AdjointEnd(differentiate_step_end(trail, scratch, target.row, by_state, derivatives))
+        status = AdjointEnd(differentiate_step_end(trail, scratch, target.row, by_state, derivatives))
     else:
         by_state[:2] = target.by_state
         if not np.any(by_state) or (target.instant == start_time and not target.is_height):
             return ""  # at rest, or the initial state itself
-    if ending not in _REASONS and target.instant > start_time:
-        trail, variation = copy_trail(target.trail), state.create_record(state.VARIATION_DTYPE)
-        ending = AdjointEnd(adjoint(trail, scratch, variation, target.row, target.elapsed, by_state, derivatives))
+    if status not in _REASONS and target.instant > start_time:
+        trail, variation = copy_trail(target.trail), state.create_struct(state.VARIATION_DTYPE)
+        status = AdjointEnd(adjoint(trail, scratch, variation, target.row, target.elapsed, by_state, derivatives))
         is_waiting = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > start_time)
-        if ending not in _REASONS and (ending == AdjointEnd.REST or is_waiting):
+        if status not in _REASONS and (status == AdjointEnd.REST or is_waiting):
             return ""  # a new rest before any uplift removes all dependence
         if not starts_at_rest and nodes["u"][0] == 0.0:
             by_state[0] = math.nan
-    if ending in _REASONS:
-        return _REASONS[ending]
+    if status in _REASONS:
+        return _REASONS[status]
     if starts_at_rest:
         by_state[:2] = math.nan
     return _FROM_REST if np.any(np.isnan(by_state)) else ""

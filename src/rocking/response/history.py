@@ -17,7 +17,7 @@ from rocking.core.tables import format_count
 from rocking.errors import OptionError
 from rocking.kernels import state
 from rocking.kernels.march import march
-from rocking.kernels.state import Records
+from rocking.kernels.state import Structs
 from rocking.kernels.trace import Trail, copy_trail, trace
 
 #: Number of samples per step in the search for the last passage of the balance.
@@ -164,14 +164,14 @@ def create_times(end: float, dt: float) -> Floats:
     return np.minimum(dt * np.arange(math.floor(end / dt * (1.0 + 1e-12)) + 1, dtype=np.float64), end)
 
 
-def find_event_steps(nodes: Records, *, overturns: bool) -> Integers:
+def find_event_steps(nodes: Structs, *, overturns: bool) -> Integers:
     """Return the rows of nodes whose steps end in an uplift, a rest or, if specified, overturning."""
     rests = nodes["side"] < 0
     rows = np.flatnonzero(rests[:-1] | rests[1:])
     return np.append(rows, len(nodes) - 2) if overturns else rows
 
 
-def find_impact_steps(nodes: Records) -> Integers:
+def find_impact_steps(nodes: Structs) -> Integers:
     """Return the rows of nodes whose steps end in an impact, as `trace.is_impact`."""
     side, moves = nodes["side"], nodes["side"] >= 0
     onto_ground = moves[:-1] & moves[1:] & (nodes["u"][1:] == 0.0)
@@ -201,11 +201,11 @@ def add_all_impacts(trail: Trail, *, ends_in_sequence: bool) -> Trail:
         start = state.create_state_at_node(nodes[row], plastic_elongations[row], _MAX_IMPACTS)
         body["rest_limit"] = np.maximum(min_speeds, _MIN_SPEED_RATIO * start["v"])
         start["peak"] = math.inf  # the peak is not needed, and weight is positive at a proven rest
-        settings["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.settings["stop"]
-        while march(trail.ground, body, settings, table, scratch, start) == state.Ending.FULL:
+        settings["stop_time"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.settings["stop_time"]
+        while march(trail.ground, body, settings, table, scratch, start) == state.MarchStatus.FULL:
             table = state.enlarge_table(table)
         later = table["node"][1 : start["nodes"]]
-        parts += [nodes[next_row : row + 1], later[(later["side"] >= 0) & (later["time"] < settings["stop"])]]
+        parts += [nodes[next_row : row + 1], later[(later["side"] >= 0) & (later["time"] < settings["stop_time"])]]
         next_row = row + 1
     return trail._replace(nodes=state.expose_fields(np.concatenate([*parts, nodes[next_row:]])))
 

@@ -22,7 +22,7 @@ from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.bisection import bisect
 from rocking.errors import OptionError
 from rocking.kernels.ground import scale_coefficients
-from rocking.kernels.state import Record
+from rocking.kernels.state import Struct
 from rocking.motion import piecewise
 from rocking.response.history import TimeHistory, compute_elongation, compute_plastic_elongations
 
@@ -189,7 +189,7 @@ class ContactForces:
 _N_BOUNDARY: Final = 201
 _MAX_RATIO: Final = 1.6
 
-#: Fields of a record that determine the potential.
+#: Fields of a struct that determine the potential.
 _POTENTIAL_FIELDS: Final = (
     "stiffness", "restoring_gain", "threshold", "slenderness", "added_weight", "added_push", "prestress", "spring",
 )  # fmt: skip
@@ -199,12 +199,12 @@ _POTENTIAL_FIELDS: Final = (
 class EnergyModel:
     """Energy of a block divided by the smallest energy from rest to an unstable balance without ground motion.
 
-    ``record`` is the body as a record for kernels. Rotations are in the frame of a side, u = |theta|. A side is 0, 1,
+    ``struct`` is the body as a struct for kernels. Rotations are in the frame of a side, u = |theta|. A side is 0, 1,
     or negative at rest.
     """
 
     body: Block | RestrainedBlock
-    record: Record
+    struct: Struct
     nonlinear: bool
 
     @cached_property
@@ -261,7 +261,7 @@ class EnergyModel:
 
     def _potential(self, u: Floats, side: Integers) -> Floats:
         """Return V(u) of these sides, 1/s^2, without cancellation at small rotations."""
-        fields = {name: self.record[name][side] for name in _POTENTIAL_FIELDS}
+        fields = {name: self.struct[name][side] for name in _POTENTIAL_FIELDS}
         weight, push = 1.0 + fields["added_weight"], fields["added_push"]
         if self.nonlinear:
             chord = 2.0 * np.sin(0.5 * u)
@@ -288,7 +288,7 @@ class EnergyModel:
     def find_sides(self, impacts: NDArray[np.void]) -> tuple[Integers, Integers]:
         """Return the sides that the body leaves and enters at impacts of a response."""
         entered: Integers = np.where(impacts["side"] > 0, 0, 1)
-        return (entered if int(self.record["next_side"][0]) == 0 else 1 - entered), entered
+        return (entered if int(self.struct["next_side"][0]) == 0 else 1 - entered), entered
 
     def compute_losses(self, impacts: NDArray[np.void]) -> Floats:
         """Return the energy loss of each impact of a response."""
@@ -302,31 +302,31 @@ def compute_linear_balance(body: Block | RestrainedBlock) -> Floats:
     For a yielding tendon the first yield is considered, with the smaller of elastic force and strength, so the nearer
     balance is returned.
     """
-    (record,) = body.as_bodies().create_kernel_records("linear", np.zeros((1, 2)))
-    elastic = _solve_linear_balance(record, record["added_weight"], record["added_push"], record["prestress"])
-    if not record["yielding"]:
+    (struct,) = body.as_bodies().create_kernel_structs("linear", np.zeros((1, 2)))
+    elastic = _solve_linear_balance(struct, struct["added_weight"], struct["added_push"], struct["prestress"])
+    if not struct["yielding"]:
         return elastic
-    elongation = record["yield_elongation"] - record["slack_elongation"]
-    force = record["base_prestress"] + record["tendon_stiffness"] * elongation
-    return np.minimum(elastic, _solve_linear_balance(record, record["base_weight"], record["base_push"], force))
+    elongation = struct["yield_elongation"] - struct["slack_elongation"]
+    force = struct["base_prestress"] + struct["tendon_stiffness"] * elongation
+    return np.minimum(elastic, _solve_linear_balance(struct, struct["base_weight"], struct["base_push"], force))
 
 
-def _solve_linear_balance(record: Record, added_weight: Floats, added_push: Floats, prestress: Floats) -> Floats:
+def _solve_linear_balance(struct: Struct, added_weight: Floats, added_push: Floats, prestress: Floats) -> Floats:
     """Return the rotation without restoring moment, if the moment is linear in the rotation."""
     balance, weight = np.full(2, math.inf), 1.0 + added_weight
-    softening = record["stiffness"] * weight - record["spring"]
-    restoring = record["restoring_gain"] * (record["threshold"] * weight + added_push) + prestress
+    softening = struct["stiffness"] * weight - struct["spring"]
+    restoring = struct["restoring_gain"] * (struct["threshold"] * weight + added_push) + prestress
     np.divide(restoring, softening, out=balance, where=softening > 0.0)
     return balance
 
 
-def create_energy(body: Body, record: Record, *, nonlinear: bool) -> EnergyModel:
+def create_energy(body: Body, struct: Struct, *, nonlinear: bool) -> EnergyModel:
     """Return the energy of a block; raise `OptionError` for a yielding tendon or a missing balance."""
     if not isinstance(body, Block | RestrainedBlock):
         raise OptionError(f"the overturning energy is defined for blocks only, not for a {type(body).__name__}")
-    if record["yielding"]:
+    if struct["yielding"]:
         raise OptionError("the energy is not defined for a yielding tendon; omit the strength of the tendon")
-    energy = EnergyModel(body, record, nonlinear)
+    energy = EnergyModel(body, struct, nonlinear)
     if not np.any(np.isfinite(energy.balance)):
         raise OptionError("this block has no overturning energy, because its restraints hold it at any rotation")
     return energy

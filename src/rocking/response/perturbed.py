@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.block.body import Coordinate
+from rocking.block.body import CoordinateLabels
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.result import Result
@@ -70,7 +70,7 @@ class PerturbedSimulations(Result):
     repeats : tuple of Repeat
         Factor, outcome, peak (rad), peak_time, overturn_time, last_rest (s; NaN if there is none) and events of each
         simulation, by ascending factor. The middle one has factor 1.
-    coordinate : Coordinate
+    coordinate : CoordinateLabels
         Name and unit of the coordinate.
     scaled_input : str
         Scaled input: "motions" or "initial states".
@@ -93,7 +93,7 @@ class PerturbedSimulations(Result):
 
     relative_step: float
     repeats: tuple[Repeat, ...]
-    coordinate: Coordinate
+    coordinate: CoordinateLabels
     scaled_input: str
 
     @property

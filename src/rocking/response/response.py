@@ -102,7 +102,7 @@ class Response(ResponseData):
 
     TABLES = ("histories", "events", "impacts", "sequences")
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         return summary.format_line(self)
 
     def summary_rows(

@@ -153,7 +153,7 @@ def _vary_input(trail: Trail, quantity: int, times: Floats, impacts: int, events
     heights, impact_changes, event_changes = np.zeros(len(times)), np.zeros(impacts), np.zeros(events)
     start = _START_FIELDS.get(quantity)
     if start is None or trail.nodes[start][0] != 0.0:  # a share of zero has no effect
-        scratch, variation = state.create_scratch(), state.create_record(state.VARIATION_DTYPE)
+        scratch, variation = state.create_scratch(), state.create_struct(state.VARIATION_DTYPE)
         compute_variation(
             copy_trail(trail), scratch, variation, quantity, times, heights, impact_changes, event_changes
         )
@@ -214,7 +214,7 @@ def bound_rest_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
     nodes = state.expose_fields(np.append(trail.nodes, trail.nodes[-1:]))
     nodes["side"][-1] = state.AT_REST
     trail = copy_trail(trail._replace(nodes=nodes))
-    scratch, variation = state.create_scratch(), state.create_record(state.VARIATION_DTYPE)
+    scratch, variation = state.create_scratch(), state.create_struct(state.VARIATION_DTYPE)
     fastest, out = np.sqrt(np.max(np.abs(trail.block["stiffness"]))), np.zeros_like(trail.ground.pieces[:, 2:])
     last, errors = (np.flatnonzero((nodes["side"][:-1] >= 0) & (nodes["side"][1:] < 0)), np.full(len(proven), np.inf))
     for k in np.flatnonzero(proven):
@@ -224,10 +224,10 @@ def bound_rest_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
             continue
         if node["v"] > 0.0:  # derivatives deviate from first order at least twice as much as the time to rest
             change[:3] *= 1.0 + 4.0 * abs((following["time"] - node["time"]) / (change[1] * node["v"]) - 1.0)
-        ending = adjoint(trail, scratch, variation, row, time, change, out)
+        status = adjoint(trail, scratch, variation, row, time, change, out)
         error = change[3] + 4.0 * _ULP * stop * abs(change[0])
         nonlinear = error * max(fastest, change[4])
-        if ending in (AdjointEnd.START, AdjointEnd.REST) and nonlinear <= _MAX_NONLINEARITY:
+        if status in (AdjointEnd.START, AdjointEnd.REST) and nonlinear <= _MAX_NONLINEARITY:
             errors[k] = error / (1.0 - nonlinear)
     return errors
 

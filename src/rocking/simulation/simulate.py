@@ -125,13 +125,13 @@ def compute_response(
     setup = Setup(bodies, model, scheme, duration, initial, friction)
     run = setup.prepare(motion, factor, writes_tables=True, name=name)
     if factor != 1.0:
-        set_start(run.states, run.records, bodies, *_scale_start(initial, factor, run.records, bodies.stops[0]), name)
-    trail, body_state = Trail(run.ground, run.records[0], run.settings, NO_NODES), run.states[0]
-    ending, table = march_in_slices(trail, body_state)
-    if ending == state.Ending.BALANCED:
+        set_start(run.states, run.structs, bodies, *_scale_start(initial, factor, run.structs, bodies.stops[0]), name)
+    trail, body_state = Trail(run.ground, run.structs[0], run.settings, NO_NODES), run.states[0]
+    status, table = march_in_slices(trail, body_state)
+    if status == state.MarchStatus.BALANCED:
         raise OptionError("the block remains balanced on its corner; give {} or another initial state", "duration")
     events = table["event"][: body_state["events"]]
-    overturned = ending == state.Ending.OVERTURNED
+    overturned = status == state.MarchStatus.OVERTURNED
     return Response(
         block=block,
         motion=motion,
@@ -139,9 +139,9 @@ def compute_response(
         chattering=scheme,
         friction=friction,
         overturned=overturned,
-        unfinished=ending == state.Ending.UNFINISHED,
-        leans=ending == state.Ending.LEANS,
-        lost_contact=ending == state.Ending.LOST,
+        unfinished=status == state.MarchStatus.UNFINISHED,
+        leans=status == state.MarchStatus.LEANS,
+        lost_contact=status == state.MarchStatus.LOST,
         largest_slip=bodies.gravity * float(body_state["largest_slip"]),
         overturn_time=float(events["time"][-1]) if overturned else math.nan,
         peak_rotation=float(compute_peaks(body_state, trail.block, np.array(block.stops))),
@@ -166,44 +166,44 @@ def compute_response(
 
 
 def _scale_start(
-    initial: tuple[float, float], factor: float, records: state.Records, stops: Floats
+    initial: tuple[float, float], factor: float, structs: state.Structs, stops: Floats
 ) -> tuple[float, float]:
     """Scale the distance of an initial coordinate from its stop, below overturning, and its rate."""
     coordinate, rate = initial
     if coordinate in stops:
         return coordinate, factor * rate
-    limit = math.nextafter(float(records["overturn_angle"].min()), 0.0)
+    limit = math.nextafter(float(structs["overturn_angle"].min()), 0.0)
     distance = factor * (coordinate - float(stops[0]))
     return float(stops[0]) + min(max(distance, -limit), limit), factor * rate
 
 
-def march_in_slices(trail: Trail, body_state: state.Record) -> tuple[int, state.Records]:
+def march_in_slices(trail: Trail, body_state: state.Struct) -> tuple[int, state.Structs]:
     """Integrate in interruptible slices, and return the end and the growing table."""
     ground, block, settings, _ = trail
     table = state.create_table(128 + int(_ROWS_PER_PIECE * len(ground.pieces)))
     scratch = state.create_scratch()
-    ending: int = state.Ending.PAUSED
+    status: int = state.MarchStatus.PAUSED
     for _ in range(count_slices(ground)):
         body_state["budget"] = STEPS_PER_SLICE
-        ending = march(ground, block, settings, table, scratch, body_state)
-        while ending == state.Ending.FULL:
+        status = march(ground, block, settings, table, scratch, body_state)
+        while status == state.MarchStatus.FULL:
             table = state.enlarge_table(table)
-            ending = march(ground, block, settings, table, scratch, body_state)
-        if ending != state.Ending.PAUSED:
-            return ending, table
+            status = march(ground, block, settings, table, scratch, body_state)
+        if status != state.MarchStatus.PAUSED:
+            return status, table
     body_state["end_time"] = table["node"]["time"][body_state["nodes"] - 1]
-    body_state["ending"] = state.Ending.UNFINISHED
-    return state.Ending.UNFINISHED, table
+    body_state["status"] = state.MarchStatus.UNFINISHED
+    return state.MarchStatus.UNFINISHED, table
 
 
-def _convert_rows(rows: state.Records, dtype: np.dtype[np.void]) -> NDArray[np.void]:
+def _convert_rows(rows: state.Structs, dtype: np.dtype[np.void]) -> NDArray[np.void]:
     converted = np.empty(len(rows), dtype=dtype)
     for name in dtype.names or ():
         converted[name] = rows[name]
     return converted
 
 
-def _convert_events(rows: state.Records) -> NDArray[np.void]:
+def _convert_events(rows: state.Structs) -> NDArray[np.void]:
     events = np.empty(len(rows), dtype=_EVENT_DTYPE)
     events["time"], events["side"], events["kind"] = rows["time"], rows["side"], _EVENT_KINDS[rows["kind"]]
     return events

@@ -60,7 +60,7 @@ class ResistanceRose(DatasetResult):
         "support": ("east", "north"),
     })  # fmt: skip
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         data = self.data
         weakest = f"towards {data.weakest_azimuth:.4g} deg, at {data.weakest_acceleration:.4g} g"
         return f"{data.description}: lifted first {weakest}"
@@ -77,7 +77,7 @@ class ResistanceRose(DatasetResult):
             f"products of inertia are up to {coupling:.2g} of the moment, pivots lie up to {offset:.2g} m to the side "
             f"of the centre of mass, and those of both sides up to {gap:.2g} m from facing each other"
         )
-        return "\n\n".join([self._headline(), format_some_rows([*titles.values()], rows), limits])
+        return "\n\n".join([self._format_headline(), format_some_rows([*titles.values()], rows), limits])
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data
@@ -103,7 +103,7 @@ class ResistanceRose(DatasetResult):
             p=data.p.values,
             support=np.column_stack([data.east.values, data.north.values]) / data.height_of_mass,
             weakest=(data.weakest_azimuth, data.weakest_acceleration),
-            title=title or escape_dollars(self._headline()),
+            title=title or escape_dollars(self._format_headline()),
             ax=ax,
             figsize=figsize,
         )

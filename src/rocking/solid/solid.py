@@ -232,7 +232,7 @@ class Solid(Result):
         angles, support, height = check_azimuths(azimuths), self._centred_support, float(self.centre[2])
         return compute_rose(support, height, self.inertia_over_mass, self.gravity, angles, self.description)
 
-    def _headline(self) -> str:
+    def _format_headline(self) -> str:
         values = {"m high": self.height, "m^3": self.volume, "kg": self.mass}
         sizes = ", ".join(f"{value:.4g} {unit}" for unit, value in values.items() if value is not None)
         return ": ".join(filter(None, (self.description, sizes)))
@@ -260,7 +260,7 @@ class Solid(Result):
             *(Row("repaired", sentence) for sentence in self.repairs),
             *(Row("note", sentence) for sentence in self.notes),
         ]  # fmt: skip
-        return f"{self._headline()}\n\n{format_rows(rows, 22)}"
+        return f"{self._format_headline()}\n\n{format_rows(rows, 22)}"
 
     def to_dict(self) -> dict[str, Any]:
         units = {"height": "m", "volume": "m^3", "mass": "kg", "gravity": "m/s^2", "centre": "m"}

@@ -390,11 +390,11 @@ def compute_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
     shares = check_fractiles(fractiles)
     product, scales, count = store.product, store.product.scales, len(store.product.bodies)
     values = np.empty((len(shares), scales.count, count))
-    overturned, missing = np.empty((scales.count, count)), 0
+    overturned, missing_count = np.empty((scales.count, count)), 0
     with Progress("reading", count) as bar:
         for blocks, ratios in _iterate_peak_ratios(store):
             repeated = _mark_repeated(product.bodies.select(blocks), ratios.shape[2])
-            missing += int(np.count_nonzero(np.isnan(ratios) & ~repeated))
+            missing_count += int(np.count_nonzero(np.isnan(ratios) & ~repeated))
             distinct = np.where(repeated, np.nan, ratios).swapaxes(1, 2).reshape(-1, scales.count, ratios.shape[3])
             values[:, :, blocks] = compute_fractiles(distinct, shares)
             overturned[:, blocks] = compute_overturned_share(distinct)
@@ -406,14 +406,14 @@ def compute_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
     }
     coordinates = {"fractile": shares, "scale": ("scale", scales.values, scales.attributes)}
     text = f"fractiles of peak rotation over slenderness, {format_count(len(product.motions), 'motion')}"
-    description = _describe(f"{text}, {product.model} model", missing)
+    description = _describe(f"{text}, {product.model} model", missing_count)
     attributes = {"description": description, "model": product.model}
     return BlockTable(xr.Dataset(variables, coordinates | body_coordinates(product.bodies), attributes))
 
 
-def _describe(text: str, missing: int) -> str:
+def _describe(text: str, missing_count: int) -> str:
     """Add the number of simulations without a result to a description."""
-    return "; ".join(filter(None, [text, describe_missing(missing)]))
+    return "; ".join(filter(None, [text, describe_missing(missing_count)]))
 
 
 def fit_pooled_fragility(
@@ -433,13 +433,13 @@ def fit_pooled_fragility(
     shares = normalise_positive_weights(weights, len(bodies))
     motions = _list_counted_motions(product, measure, larger=larger)
     scales = product.scales.count
-    trials, missing = np.zeros((len(motions), scales, len(units))), 0
+    trials, missing_count = np.zeros((len(motions), scales, len(units))), 0
     counts = {name: np.zeros_like(trials) for name in limits}
     for blocks, ratios in _iterate_peak_ratios(store, measure if larger else None):
         membership = np.where(unit_indices[blocks][:, None] == np.arange(len(units)), shares[blocks][:, None], 0.0)
         is_known = ~np.isnan(ratios)
         trials += is_known.sum(axis=2, dtype=float) @ membership
-        missing += int(np.count_nonzero(~is_known))
+        missing_count += int(np.count_nonzero(~is_known))
         for name, limit in limits.items():
             counts[name] += compute_exceedances(ratios, limit, name).sum(axis=2) @ membership
     has_trials = trials > 0.0
@@ -460,7 +460,7 @@ def fit_pooled_fragility(
         includes_vertical=bool(collect_verticals(product.motions)),
         has_several_blocks=bool(np.count_nonzero(shares) > 1),
         source="motion" if clusters is None else "cluster",
-        missing=describe_missing(missing),
+        missing_note=describe_missing(missing_count),
     )
 
 
@@ -492,7 +492,7 @@ def fit_block_fragilities(
     limits = _check_limit_states(limit_states, confidence)
     product, bodies, scales = store.product, store.product.bodies, store.product.scales.count
     estimates = {name: np.full((len(limits), len(bodies)), np.nan) for name in _CURVE_VARIABLES}
-    faults, missing = np.full((len(limits), len(bodies)), "", dtype=object), 0
+    faults, missing_count = np.full((len(limits), len(bodies)), "", dtype=object), 0
     motions = _list_counted_motions(product, measure, larger=larger)
     intensities = _compute_intensities(product, measure)[motions].ravel()
     units = compute_block_units(bodies, measure, product.model)
@@ -501,7 +501,7 @@ def fit_block_fragilities(
     with Progress("fitting", len(bodies) * len(limits)) as bar:
         for blocks, ratios in _iterate_peak_ratios(store, measure if larger else None):
             repeated = _mark_repeated(bodies.select(blocks), ratios.shape[2])
-            missing += int(np.count_nonzero(np.isnan(ratios) & ~repeated))
+            missing_count += int(np.count_nonzero(np.isnan(ratios) & ~repeated))
             distinct = np.where(repeated, np.nan, ratios)
             all_trials = np.count_nonzero(~np.isnan(distinct), axis=2).reshape(-1, distinct.shape[3])
             for i, (name, limit) in enumerate(limits.items()):
@@ -524,7 +524,7 @@ def fit_block_fragilities(
     dims, unfitted_count = ("limit_state", "block"), int(np.count_nonzero(faults != ""))
     text = f"fragility of {format_count(len(bodies), 'block')}; intensity: {measure.quantity}"
     text += f"; {format_count(unfitted_count, 'curve')} cannot be fitted (see fault)" if unfitted_count else ""
-    attributes = {"description": _describe(text, missing), "confidence": confidence, "model": product.model}
+    attributes = {"description": _describe(text, missing_count), "confidence": confidence, "model": product.model}
     attributes |= {"measure": measure.name, **measure.options()}
     variables = {}
     for name, values in estimates.items():

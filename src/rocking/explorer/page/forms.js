@@ -73,7 +73,7 @@ export class Field {
   slid() {
     const {low, high, logarithmic, suffix} = this.spec.own ?? this.spec, part = Number(this.slider.value) / this.steps; // rounded in its own unit
     const value = Number((logarithmic ? low * (high / low) ** part : low + part * (high - low)).toPrecision(3));
-    this.show(value + suffix + (this.spec.value_count === "two" ? `,${value}${suffix}` : ""));
+    this.show(value + suffix + (this.spec.arity === "two" ? `,${value}${suffix}` : ""));
     this.changed();
   }
 

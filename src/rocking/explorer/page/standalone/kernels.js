@@ -1,5 +1,5 @@
-// Calls of the kernels, which are compiled to WebAssembly from the code of the package. Layouts of records, codes and
-// settings come from the package (DATA): here numbers are put into records, and read from them.
+// Calls of the kernels, which are compiled to WebAssembly from the code of the package. Layouts of structs, codes and
+// settings come from the package (DATA): here numbers are put into structs, and read from them.
 
 /** What the package says of its kernels (`describe_computation`). @type {any} */
 export const DATA = JSON.parse(/** @type {any} */ (globalThis).TEXT ?? document.getElementById("data")?.textContent ?? "{}");
@@ -71,7 +71,7 @@ export class Kernels {
     return at;
   }
 
-  /** Write a field of a record; one number serves all its items. @param {string} layout @param {number} at @param {string} name @param {number | number[]} value */
+  /** Write a field of a struct; one number serves all its items. @param {string} layout @param {number} at @param {string} name @param {number | number[]} value */
   set(layout, at, name, value) {
     const [offset, kind, count] = DATA.layouts[layout].fields[name], {view} = this;
     for (let k = 0; k < count; k += 1) {
@@ -116,7 +116,7 @@ export class Kernels {
     return [.../** @type {number[]} */ (this.slots).slice(0, -2), factor, 1 / GRAVITY];
   }
 
-  /** The record of a block. @param {Body} body */
+  /** The struct of a block. @param {Body} body */
   block(body) {
     const {sides, model, threshold} = body, at = this.put(templates[`block ${kindOf(body)}`]), linear = model === "linear", {sin, cos, tan} = this.exports;
     const fields = {
@@ -138,20 +138,20 @@ export class Kernels {
     const settings = this.put(templates[`settings ${kindOf(body)} ${recorded ? "record" : "state"}`]), state = this.put(templates.state);
     if (start) for (const [name, value] of Object.entries({...start, peak: start.u})) this.set("state", state, name, value);
     const {size} = DATA.layouts.table, {slice, total, per_piece: each} = DATA.budget;
-    let rows = recorded ? 256 + 2 * ground[1] : 0, table = this.take(rows * size), ending = DATA.endings.PAUSED;
-    for (let k = 0; k < Math.ceil((total + each * ground[1]) / slice) && ending === DATA.endings.PAUSED; k += 1) {
+    let rows = recorded ? 256 + 2 * ground[1] : 0, table = this.take(rows * size), status = DATA.statuses.PAUSED;
+    for (let k = 0; k < Math.ceil((total + each * ground[1]) / slice) && status === DATA.statuses.PAUSED; k += 1) {
       this.set("state", state, "budget", slice);
-      ending = this.call("march", [...ground, block, settings, table, rows, scratch, state]);
-      while (ending === DATA.endings.FULL) {
+      status = this.call("march", [...ground, block, settings, table, rows, scratch, state]);
+      while (status === DATA.statuses.FULL) {
         const larger = this.take(2 * rows * size);
         new Uint8Array(this.memory.buffer).copyWithin(larger, table, table + rows * size);
         [table, rows] = [larger, 2 * rows];
-        ending = this.call("march", [...ground, block, settings, table, rows, scratch, state]);
+        status = this.call("march", [...ground, block, settings, table, rows, scratch, state]);
       }
     }
     const number = (/** @type {string} */ name) => this.get("state", state, name);
     const outcome = {
-      ending, overturned: ending === DATA.endings.OVERTURNED, peak: number("peak"), peakTime: number("peak_time"), impacts: number("impacts"),
+      status, overturned: status === DATA.statuses.OVERTURNED, peak: number("peak"), peakTime: number("peak_time"), impacts: number("impacts"),
       uplifts: number("uplifts"), rests: number("rests"), end: number("end_time"), firstUplift: number("first_uplift"), firstRest: number("first_rest"), lastRest: number("last_rest_time"),
     };
     if (!recorded) return {...outcome, events: [], impactTimes: new Float64Array(0), nodes: new Uint8Array(0)};

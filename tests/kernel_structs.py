@@ -12,7 +12,7 @@ from rocking.kernels import state
 from rocking.kernels.compiled import UNCOMPILED
 from rocking.kernels.ground import Ground
 from rocking.kernels.ground import build_ground as laid_out
-from rocking.kernels.state import Record
+from rocking.kernels.state import Struct
 
 GRAVITY = 9.80665
 ULP = 2.0**-52
@@ -45,9 +45,9 @@ def rocking_block(
     nonlinear: bool = False,
     limit: float = 0.0,
     fallen: float = 0.5 * math.pi,
-) -> Record:
+) -> Struct:
     p, alpha = np.array(p, dtype=float), np.array(alpha, dtype=float)
-    return state.create_record(
+    return state.create_struct(
         state.BLOCK_DTYPE,
         stiffness=p * p,
         slenderness=alpha,
@@ -62,9 +62,9 @@ def rocking_block(
     )
 
 
-def one_sided(stiffness: float, gain: float, threshold: float, e: float) -> Record:
+def one_sided(stiffness: float, gain: float, threshold: float, e: float) -> Struct:
     """Something that bounces on one side: u'' = stiffness u - gain (threshold + a), and back with e times the speed."""
-    return state.create_record(
+    return state.create_struct(
         state.BLOCK_DTYPE,
         stiffness=stiffness,
         threshold=(threshold, math.inf),
@@ -82,19 +82,19 @@ def rules_for(
     tolerance: float = 1e-12,
     stop: float = math.inf,
     writes_tables: bool = True,
-) -> Record:
-    return state.create_record(
+) -> Struct:
+    return state.create_struct(
         state.SETTINGS_DTYPE,
         nonlinear=nonlinear,
         rest_rule=rest_rule,
         tolerance=tolerance,
-        stop=stop,
+        stop_time=stop,
         no_end_time=stop == math.inf,
         writes_tables=writes_tables,
     )
 
 
-def state_of(side: int, u: float, v: float, *, piece: int = 0, offset: float = 0.0, **others: float) -> Record:
+def state_of(side: int, u: float, v: float, *, piece: int = 0, offset: float = 0.0, **others: float) -> Struct:
     """A block on its way: a march goes on from here to the end."""
     made = state.create_states(1, 10**6)[0]
     for name, value in {"side": side, "u": u, "v": v, "piece": piece, "offset": offset, "peak": u, **others}.items():
@@ -102,7 +102,7 @@ def state_of(side: int, u: float, v: float, *, piece: int = 0, offset: float = 0
     return made
 
 
-def block_of(problem: Problem) -> Record:
+def block_of(problem: Problem) -> Struct:
     return rocking_block(problem.p, problem.alpha, problem.restitution, nonlinear=problem.model == "nonlinear")
 
 
