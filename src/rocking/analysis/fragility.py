@@ -476,9 +476,7 @@ def fragility(
         has_several_blocks=bool(np.count_nonzero(block_weights) > 1),
         source="motion" if clusters is None else "cluster",
         undecided_note=describe_undecided(setup, motions, factors, table.overturned.values),
-        missing_note="; ".join(
-            filter(None, [describe_missing(table.unfinished.values), _describe_lost(has_lost_contact)])
-        ),
+        missing_note="; ".join(filter(None, missing_notes)),
     )
 
 

@@ -169,8 +169,8 @@ class IncrementalDynamicAnalysis(DatasetResult):
         smaller slenderness, infinite for overturning, NaN for abandoned simulations, which bands count as not
         overturning) and overturned. Over (motion, block): overturning_level, the lowest that overturns, or NaN if none
         or already the first does. Over (band): band_motion and band_block (positions), band_start and band_end, NaN
-        beyond the levels. Attributes: lowest_uplift, the lowest level that lifts a block, and undecided_note, the number
-        of outcomes in a sample that change within 3e-6 of the motion.
+        beyond the levels. Attributes: lowest_uplift, the lowest level that lifts a block, and undecided_note, the
+        number of outcomes in a sample that change within 3e-6 of the motion.
 
     See Also
     --------
