@@ -26,7 +26,7 @@ for _ in range(160):
 # slenderness, and how much it varies from test to test.
 
 calibration = rocking.calibrate(
-    pulses[:80], overturned[:80], model="linear", p=p, restitution="housner", two_sided=False, candidates=512
+    pulses[:80], overturned[:80], model="linear", p=p, restitution="housner", two_sided=False, candidate_count=512
 )
 found = calibration.estimates["alpha"].median
 print(calibration.summary())

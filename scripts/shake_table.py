@@ -63,7 +63,9 @@ def main() -> None:
                 chances = left_out(intensities, overturned, labels, options.cross_validate)
                 repeats = tuple(Scores.from_predictions(row, overturned) for row in chances)
                 report(f"logistic regression, {name}", Validation(chances, repeats).scores)
-                validation = calibration.cross_validate(groups=labels, folds=FOLDS, repeats=options.cross_validate)
+                validation = calibration.cross_validate(
+                    groups=labels, fold_count=FOLDS, repeat_count=options.cross_validate
+                )
                 report(f"rocking blocks, {name}", validation.scores)
 
 

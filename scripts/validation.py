@@ -215,7 +215,7 @@ def judged_of(motions, overturned, groups, calibration, folds):
         rocking.ShakeTest(motion, fell, group=group)
         for motion, fell, group in zip(motions, overturned, groups, strict=True)
     ]
-    left_out = calibration.cross_validate(groups=groups, folds=folds)
+    left_out = calibration.cross_validate(groups=groups, fold_count=folds)
     return {"fitted": rocking.validate(tests, calibration), "left out": rocking.validate(tests, left_out)}
 
 
@@ -251,7 +251,7 @@ def left_out_rows(specimen, motions, overturned, groups, calibrations):
     intensities = np.log([(motion.pga, motion.pgv) for motion in motions])
     chances = left_out(intensities, overturned, groups, 1)
     regression = Validation(chances, tuple(Scores.from_predictions(row, overturned) for row in chances)).scores
-    scores = {name: one.cross_validate(groups=groups, folds=folds).scores for name, one in calibrations.items()}
+    scores = {name: one.cross_validate(groups=groups, fold_count=folds).scores for name, one in calibrations.items()}
     told = {"logistic regression on PGA and PGV": regression, **scores}
     return [score_row(specimen, name, one) for name, one in told.items()]
 

@@ -139,7 +139,7 @@ def attempt(function: Callable[..., Any], *arguments: Any, **options: Any) -> An
 
 def of_response(response: Any) -> dict[str, Any]:
     """Everything that one simulation found, but for the bracket on the time of a rest."""
-    fields = ("outcome", "overturned", "unfinished", "stopped", "overturn_time", "peak_rotation", "peak_time")
+    fields = ("outcome", "overturned", "unfinished", "ended_early", "overturn_time", "peak_rotation", "peak_time")
     times = np.arange(26) * (response.duration / 25.0)
     sequences = response.sequences
     return {
@@ -683,7 +683,7 @@ def observed() -> tuple[list[rocking.Motion], list[bool]]:
 @functools.cache
 def calibrated() -> Any:
     motions, overturned = observed()
-    options = {"candidates": 128, "max_blocks": 60, "p": 3.0, "two_sided": False, "seed": 5}
+    options = {"candidate_count": 128, "max_blocks": 60, "p": 3.0, "two_sided": False, "seed": 5}
     return rocking.calibrate(motions, overturned, model="linear", **options, **QUIET)
 
 
@@ -692,7 +692,7 @@ def calibrations() -> Iterator[Item]:
     found = calibrated()
     yield from of_result(found)
     yield "predictions", found.predict(suite(), **QUIET)
-    scores = found.cross_validate(folds=3, seed=2, **QUIET)
+    scores = found.cross_validate(fold_count=3, seed=2, **QUIET)
     yield "scores", [scores.probabilities, str(scores.scores)]
 
 
@@ -713,7 +713,7 @@ def validations() -> Iterator[Item]:
         for k, (motion, fell) in enumerate(zip(motions, overturned, strict=True))
     ]
     block = rocking.Block.from_parameters(p=3.2, alpha=0.21, restitution=0.88)
-    options = {"outlier_probability": 0.01, "bins": 4, "simulations": 200, "seed": 3}
+    options = {"outlier_probability": 0.01, "bin_count": 4, "simulation_count": 200, "seed": 3}
     yield from of_result(rocking.validate(tests, block, **options, **QUIET))
     yield from of_result(rocking.validate(tests, SUITE_BLOCKS, weights=[1.0, 2.0, 1.0, 1.0], **options, **QUIET))
 
@@ -758,7 +758,7 @@ def continuations() -> Iterator[Item]:
         return ball, one.scaled(level)
 
     found = dynamics.periodic_orbits(*family(1.2), starts=40)
-    start = next(each for each in found if each.is_stable and not each.has_rest and each.impacts)
+    start = next(each for each in found if each.is_stable and not each.has_rest and each.impact_count)
     branch = dynamics.continue_orbit(start, family, 1.2, (1.0, 1.7), step=0.2)
     yield "ends", branch.ends
     yield "bifurcations", [[each.kind, each.value] for each in branch.bifurcations]
@@ -1012,7 +1012,7 @@ ON_FILES: Final = {
     ],
     "tests": [
         f"validate tests.csv {SIZES} --outlier-probability 0.01 --out judged",
-        "calibrate shaken.csv --candidates 128 --p 3 --restitution housner --no-two-sided",
+        "calibrate shaken.csv --candidate-count 128 --p 3 --restitution housner --no-two-sided",
     ],
     "study": [
         "study new template.toml",
@@ -1063,7 +1063,15 @@ def studies() -> Iterator[Item]:
         study = rocking.create_study(folder / "study", SUITE_BLOCKS, motions, levels=LEVELS, measure="pga")
         with rocking.set_options(threads=1):
             study.run()
-        yield "complete", [study.status.is_complete, study.status.done, study.status.units, study.status.simulations]
+        yield (
+            "complete",
+            [
+                study.status.is_complete,
+                study.status.done_count,
+                study.status.batch_count,
+                study.status.simulation_count,
+            ],
+        )
         yield "results", of_dataset(study.results())
         yield "critical", of_dataset(study.critical_scales())
         yield from of_result(study.fragility(limit_states=LIMITS))

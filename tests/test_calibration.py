@@ -55,7 +55,7 @@ def told(shaken):
 @pytest.fixture(scope="module")
 def found(told, coarsely):
     with coarsely():
-        return rocking.calibrate(*told, candidates=512, model="linear")
+        return rocking.calibrate(*told, candidate_count=512, model="linear")
 
 
 @pytest.fixture(scope="module")
@@ -123,10 +123,10 @@ def test_fitted_probabilities_are_those_of_the_ensemble(found, told):
 @pytest.mark.slow
 def test_cross_validation_says_how_good_predictions_are(coarsely, shaken, unseen):
     with coarsely():
-        found = rocking.calibrate(*shaken, candidates=512, model="linear")
-    validation = found.cross_validate(folds=4, repeats=2)
+        found = rocking.calibrate(*shaken, candidate_count=512, model="linear")
+    validation = found.cross_validate(fold_count=4, repeat_count=2)
     assert validation.probabilities.shape == (2, len(shaken[0]))
-    for row, scores in zip(validation.probabilities, validation.repeats, strict=True):
+    for row, scores in zip(validation.probabilities, validation.scores_by_repeat, strict=True):
         assert scores == Scores.from_predictions(row, shaken[1])
     honest = Scores.from_predictions(found.predict(unseen[0]), unseen[1])
     assert found.scores.log_loss < validation.scores.log_loss
@@ -139,8 +139,8 @@ def test_a_group_is_left_out_as_a_whole(coarse):
     # Each motion comes twice, with opposite outcomes: whoever saw the twin would predict the wrong outcome.
     motions = bursts(6, seed=4)
     overturned = np.arange(12) < 6
-    found = rocking.calibrate(motions * 2, overturned, candidates=128, two_sided=False, model="linear")
-    validation = found.cross_validate(groups=[*range(6)] * 2, folds=2)
+    found = rocking.calibrate(motions * 2, overturned, candidate_count=128, two_sided=False, model="linear")
+    validation = found.cross_validate(groups=[*range(6)] * 2, fold_count=2)
     first, second = validation.probabilities[0, :6], validation.probabilities[0, 6:]
     # Twins differ by the order of single-precision sums.
     np.testing.assert_allclose(first, second, rtol=1e-6)
@@ -155,7 +155,7 @@ def test_dispersion_from_test_to_test_is_measured():
     for deviation in (0.0, 0.4):
         factors = np.exp(deviation * rng.standard_normal(len(motions)))
         fallen = outcomes([motion.scaled(factor) for motion, factor in zip(motions, factors, strict=True)])
-        found = rocking.calibrate(motions, fallen, candidates=1024, two_sided=False, model="linear")
+        found = rocking.calibrate(motions, fallen, candidate_count=1024, two_sided=False, model="linear")
         dispersions.append(found.estimates["alpha"].dispersion)
     # No dispersion at all cannot be told from one as wide as the candidates are apart.
     assert dispersions[1] > 1.5 * dispersions[0]
@@ -165,7 +165,7 @@ def test_blocks_keep_to_the_bounds(coarse, shaken):
     found = rocking.calibrate(
         shaken[0][:10],
         shaken[1][:10],
-        candidates=256,
+        candidate_count=256,
         p=(2.0, 3.0),
         alpha=(0.1, 0.2),
         restitution=(0.7, 1.0),
@@ -180,14 +180,14 @@ def test_the_nonlinear_model_calibrates_too(coarse):
     motions = bursts(12, seed=9)
     block = rocking.Block.from_parameters(p=3.0, alpha=0.25, restitution=0.85)
     overturned = [rocking.simulate(block, motion).overturned for motion in motions]
-    found = rocking.calibrate(motions, overturned, model="nonlinear", candidates=128, two_sided=False)
+    found = rocking.calibrate(motions, overturned, model="nonlinear", candidate_count=128, two_sided=False)
     assert found.model == "nonlinear"
     assert found.scores.accuracy > 0.9
 
 
 def test_what_is_known_has_no_estimate_and_stays(coarse, shaken):
     known = {"p": 3.55, "restitution": 0.81}
-    found = rocking.calibrate(shaken[0][40:60], shaken[1][40:60], candidates=128, **known, model="linear")
+    found = rocking.calibrate(shaken[0][40:60], shaken[1][40:60], candidate_count=128, **known, model="linear")
     assert set(found.estimates) == {"alpha_plus", "alpha_minus"}
     assert np.all(found.blocks.p == 3.55) and np.all(found.blocks.restitution == 0.81)
     assert len(found.plot().axes) == 2
@@ -201,7 +201,7 @@ def test_one_unknown_angle_is_found_from_forty_tests(coarse):
     found = rocking.calibrate(
         motions,
         outcomes(motions, size),
-        candidates=256,
+        candidate_count=256,
         p=size.p,
         restitution="housner",
         two_sided=False,
@@ -223,7 +223,7 @@ def test_one_unknown_angle_is_found_from_forty_tests(coarse):
         ({"overturned": ["no", "yes", "no"]}, "True or False"),
         ({"outlier_probability": 0.0}, "outlier_probability"),
         ({"outlier_probability": 0.5}, "outlier_probability"),
-        ({"candidates": 10}, "candidates"),
+        ({"candidate_count": 10}, "candidate_count"),
         ({"p": (2.0, 1.0)}, "p must be"),
         ({"p": 2.0, "alpha": 0.2, "restitution": 0.9}, "all parameters are known"),
         ({"restitution": "hausner"}, "'housner'"),
@@ -234,7 +234,7 @@ def test_one_unknown_angle_is_found_from_forty_tests(coarse):
     ],
 )
 def test_a_mistaken_argument_is_refused(change, word):
-    arguments = {"motions": bursts(3, seed=0), "overturned": [True, False, True], "candidates": 128} | change
+    arguments = {"motions": bursts(3, seed=0), "overturned": [True, False, True], "candidate_count": 128} | change
     with pytest.raises(rocking.errors.OptionError, match=word):
         rocking.calibrate(**arguments)
 
@@ -372,7 +372,7 @@ def test_a_motion_that_is_given_twice_is_simulated_once(coarse, monkeypatch):
     monkeypatch.setattr("rocking.calibration.outcomes.simulate_many", spy)
     twice = motions + [rocking.Motion(one.breakpoints, one.coefficients, name="again") for one in motions]
     observed = outcomes(twice)
-    found = rocking.calibrate(twice, observed, candidates=128, two_sided=False, model="linear")
+    found = rocking.calibrate(twice, observed, candidate_count=128, two_sided=False, model="linear")
     assert set(counted) == {12}
     np.testing.assert_allclose(found.probabilities[:12], found.probabilities[12:], rtol=1e-12)
 
@@ -674,7 +674,7 @@ def test_rows_without_a_group_belong_to_none(tmp_path):
     rows = [f"ridgecrest-clc-090,{scale},1,{group}" for scale, group in scales]
     table.write_text("\n".join(["motion,scale,overturned,group", *rows]))
     read = read_calibration(table, channel=None, dt=None, units=None)
-    assert label_groups([test.group for test in read], 4, folds=3).tolist() == [0, 1, 2, 0]
+    assert label_groups([test.group for test in read], 4, fold_count=3).tolist() == [0, 1, 2, 0]
 
 
 def test_a_pair_of_equal_numbers_is_known_and_nothing_unknown_says_what_to_call(shaken):

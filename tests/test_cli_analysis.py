@@ -16,7 +16,7 @@ from rocking.inputs import quantities
 RECORD = "el-centro-meloland-270"
 OTHER = "el-centro-meloland-360"
 SIZES = ["--half-width", "0.12", "--half-height", "0.55"]
-CALIBRATED = ["--candidates", "128", "--p", "3", "--restitution", "housner", "--no-two-sided"]
+CALIBRATED = ["--candidate-count", "128", "--p", "3", "--restitution", "housner", "--no-two-sided"]
 
 
 def test_spectrum_json_is_the_spectrum(run):
@@ -138,9 +138,9 @@ def test_what_is_wrong_with_what_is_given_is_said_before_the_work(run, tmp_path,
 
 @pytest.mark.usefixtures("no_work")
 def test_more_folds_than_groups_are_refused_before_the_calibration(run, outcomes_table):
-    code, _, err = run("calibrate", outcomes_table, *CALIBRATED, "--folds", "40")
+    code, _, err = run("calibrate", outcomes_table, *CALIBRATED, "--fold-count", "40")
     assert code == 2
-    assert "--folds must be a whole number" in err
+    assert "--fold-count must be a whole number" in err
 
 
 @pytest.mark.thorough
@@ -214,13 +214,15 @@ def outcomes_table(outcomes_text, tmp_path):
 @pytest.mark.thorough
 @pytest.mark.usefixtures("coarse")
 def test_calibrate_json_is_the_calibration(run, outcomes_table):
-    code, out, err = run("calibrate", outcomes_table, *CALIBRATED, "--folds", "2", "--predict", RECORD, OTHER, "--json")
+    code, out, err = run(
+        "calibrate", outcomes_table, *CALIBRATED, "--fold-count", "2", "--predict", RECORD, OTHER, "--json"
+    )
     assert (code, err) == (0, "")
     result = json.loads(out)
     rows = [line.split(",") for line in outcomes_table.read_text().splitlines()[1:]]
     motions = [rocking.records.load(RECORD).scaled(float(row[1])) for row in rows]
     overturned = [row[2] == "1" for row in rows]
-    found = rocking.calibrate(motions, overturned, p=3.0, restitution="housner", two_sided=False, candidates=128)
+    found = rocking.calibrate(motions, overturned, p=3.0, restitution="housner", two_sided=False, candidate_count=128)
     assert list(result["estimates"]) == ["alpha"]
     assert result["estimates"]["alpha"]["median"] == pytest.approx(found.estimates["alpha"].median, rel=1e-12)
     assert result["diagnostics"]["candidate_count"] == found.diagnostics.candidate_count
@@ -316,7 +318,7 @@ def test_records_of_a_fragility_belong_together_by_station_or_by_labels(run):
     [
         (["--scale", "3"], "--scale requires a motion; add one with --motion or --pulse"),
         (["--vertical", "up"], "--vertical requires a motion"),
-        (["--candidates", "512"], "--candidates requires a table of outcomes"),
+        (["--candidate-count", "512"], "--candidate-count requires a table of outcomes"),
     ],
 )
 def test_a_free_history_goes_without_what_is_said_of_motions(run, tmp_path, arguments, said):

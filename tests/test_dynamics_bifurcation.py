@@ -115,7 +115,7 @@ def test_impacts_are_those_of_the_orbit_infinite_where_chattering_is_complete(re
     found = dynamics.bifurcation_diagram(case, levels, [0.0, 0.0], chattering=chattering)
     orbits = [dynamics.periodic_orbits(*case(level), starts=[[0.0, 0.0]], chattering=chattering)[0] for level in levels]
     impacts = found.data.impact_count.values[0, :, 0].tolist()
-    assert impacts == [each.impacts for each in orbits] and impacts[0] == 0.0 < impacts[1]
+    assert impacts == [each.impact_count for each in orbits] and impacts[0] == 0.0 < impacts[1]
     assert math.isinf(impacts[1]) == (restitution > 0.0 and chattering == "certified")
 
 

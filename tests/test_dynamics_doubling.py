@@ -20,7 +20,7 @@ def table(level):
 def followed(period, value, limits, starts):
     """Branch of the stable orbits of a ball of so many periods, followed from a value."""
     found = dynamics.periodic_orbits(*table(value), period=period, starts=starts)
-    start = next(each for each in found if each.is_stable and each.impacts == each.period == period)
+    start = next(each for each in found if each.is_stable and each.impact_count == each.period == period)
     return dynamics.continue_orbit(start, table, value, limits, step=0.2)
 
 
@@ -65,7 +65,7 @@ def bounces_of_a_ball(level, times, speeds):
 
 def test_the_doubled_orbits_of_a_ball_are_those_of_its_own_equations(once, twice):
     exact = closed_orbits.Ball(0.5, 1)
-    assert (twice.period, twice.impacts, twice.ends[0]) == (2, 2.0, "flip")
+    assert (twice.period, twice.impact_count, twice.ends[0]) == (2, 2.0, "flip")
     assert twice.bifurcations[0].value == pytest.approx(exact.flip, abs=1e-10)
     assert twice.bifurcations[0].orbit.period == 1  # what is there is the orbit that both branches share
     assert twice.bifurcations[0].value == pytest.approx(once.bifurcations[0].value, abs=1e-9)

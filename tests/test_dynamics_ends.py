@@ -22,7 +22,7 @@ def table(level, cycles=1):
 def branch_of(family, value, limits, *, starts=64, **options):
     """Branch of the stable orbit with impacts that is found first."""
     found = dynamics.periodic_orbits(*family(value), starts=starts, **options)
-    start = next(each for each in found if each.is_stable and not each.has_rest and each.impacts)
+    start = next(each for each in found if each.is_stable and not each.has_rest and each.impact_count)
     return dynamics.continue_orbit(start, family, value, limits, step=0.2)
 
 
@@ -53,7 +53,7 @@ def test_an_orbit_that_comes_to_touch_its_stop_once_more_ends_at_grazing(step):
     """Differences by the parameter that reach beyond the touch turned the tangent: it was taken for a branch point."""
     motion = pulses.sine(1.0, 1.1 / math.pi, cycles=1, phase=0.5 * math.pi)
     found = dynamics.periodic_orbits(oscillator(-0.4), motion, starts=64)
-    (orbit,) = (each for each in found if each.impacts == 1.0 and not each.is_stable)
+    (orbit,) = (each for each in found if each.impact_count == 1.0 and not each.is_stable)
     branch = dynamics.continue_orbit(orbit, lambda stop: (oscillator(stop), motion), -0.4, (-0.5, 4.5), step=step)
     assert branch.ends == ("limit of the parameter", "grazing")
     (end,) = branch.bifurcations
@@ -85,7 +85,7 @@ def test_where_an_impact_vanishes_is_extrapolated_from_orbits_that_have_it():
         return pendulum, pulses.sine(amplitude, 1.0, cycles=1)
 
     found = dynamics.periodic_orbits(*family(3.0), starts=[[0.02149176, 0.43097785]])
-    (orbit,) = (each for each in found if each.impacts == 1.0)
+    (orbit,) = (each for each in found if each.impact_count == 1.0)
     branch = dynamics.continue_orbit(orbit, family, 3.0, (2.9, 5.0))
     assert branch.ends == ("limit of the parameter", "grazing")
     (end,) = branch.bifurcations
@@ -103,7 +103,7 @@ def test_a_branch_reaches_limits_beyond_which_there_is_no_body():
         return dynamics.BouncingBall(restitution, gravity=G), pulses.sine(level * G, TABLE, cycles=1)
 
     found = dynamics.periodic_orbits(*family(0.5), starts=200)
-    start = next(each for each in found if each.is_stable and each.impacts == 1.0)
+    start = next(each for each in found if each.is_stable and each.impact_count == 1.0)
     branch = dynamics.continue_orbit(start, family, 0.5, (0.45, 1.0), step=0.2)
     assert branch.ends == ("limit of the parameter", "limit of the parameter")
     assert (branch.values[0], branch.values[-1]) == (0.45, 1.0)
@@ -124,7 +124,7 @@ def test_a_symmetric_orbit_with_a_large_multiplier_is_followed_to_grazing():
     (start,) = (
         each
         for each in dynamics.periodic_orbits(*family(3.0), starts=256)
-        if each.is_symmetric and each.impacts == 2.0 and not each.is_stable
+        if each.is_symmetric and each.impact_count == 2.0 and not each.is_stable
     )
     branch = dynamics.continue_orbit(start, family, 3.0, (1.5, 6.0))
     assert branch.ends == ("limit of the parameter", "grazing") and len(branch) < 100

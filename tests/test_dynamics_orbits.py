@@ -107,11 +107,11 @@ def test_a_stable_orbit_attracts_and_an_unstable_one_repels(found):
 def test_an_orbit_with_a_rest_has_multipliers_zero():
     ball, table = dynamics.BouncingBall(0.5, gravity=G), pulses.sine(12.0, TABLE, cycles=1)
     (rest,) = [each for each in dynamics.periodic_orbits(ball, table, starts=32) if each.has_rest]
-    assert rest.impacts == math.inf and rest.is_stable
+    assert rest.impact_count == math.inf and rest.is_stable
     assert rest.multipliers.tolist() == [0.0, 0.0]
     assert rest.response.events["kind"].tolist() == ["rest", "uplift"]
     (still,) = [each for each in dynamics.periodic_orbits(ball, 0.5 * table, starts=32) if each.has_rest]
-    assert still.state.tolist() == [0.0, 0.0] and still.impacts == 0.0
+    assert still.state.tolist() == [0.0, 0.0] and still.impact_count == 0.0
     assert "always at rest" in still.summary()
     # A wall on either side holds the pendulum.
     pendulum, motion = dynamics.InvertedPendulum(3.0, 0.1, 0.5), pulses.sine(0.3, 0.8, cycles=1)
@@ -121,7 +121,7 @@ def test_an_orbit_with_a_rest_has_multipliers_zero():
 
 def test_the_linear_response_of_an_oscillator_that_misses_its_stop_is_an_orbit():
     body, motion = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.05), pulses.sine(1.0, 1.3, cycles=1)
-    (free,) = [each for each in dynamics.periodic_orbits(body, motion) if each.impacts == 0.0]
+    (free,) = [each for each in dynamics.periodic_orbits(body, motion) if each.impact_count == 0.0]
     w0, w = 2.0 * math.pi, 2.6 * math.pi
     transfer = -1.0 / complex(w0 * w0 - w * w, 2.0 * 0.05 * w0 * w)
     assert free.state == pytest.approx([transfer.imag, w * transfer.real], abs=1e-15)
@@ -137,7 +137,7 @@ def test_orbits_of_a_shorter_period_are_listed_with_their_own():
     ball, table = dynamics.BouncingBall(0.5, gravity=G), pulses.sine(15.5, TABLE, cycles=1)
     once, twice = (dynamics.periodic_orbits(ball, table, period=period) for period in (1, 2))
     assert {each.period for each in once} == {1} and {each.period for each in twice} == {1, 2}
-    known = [each for each in twice if each.period == 1 and each.impacts == 1.0]
+    known = [each for each in twice if each.period == 1 and each.impact_count == 1.0]
     for each in known:
         twin = min(once, key=lambda other: np.max(np.abs(other.state - each.state)))
         assert twin.state == pytest.approx(each.state, abs=1e-12)
@@ -157,7 +157,7 @@ def ball_between_fold_and_flip(restitution, n):
     family = table_of(dynamics.BouncingBall(restitution, gravity=G))
     level, span = exact.fold + 0.6 * (exact.flip - exact.fold), exact.flip - exact.fold
     orbits = dynamics.periodic_orbits(*family(level), period=n, starts=128 if n == 1 else None)
-    once = [each for each in orbits if each.period == n and each.impacts == 1.0]
+    once = [each for each in orbits if each.period == n and each.impact_count == 1.0]
     start, limits = next(each for each in once if each.is_stable), (exact.fold - 0.1 * span, exact.flip + 0.1 * span)
     return exact, level, once, dynamics.continue_orbit(start, family, level, limits, name="level")
 
@@ -203,7 +203,7 @@ def test_orbits_of_an_oscillator_that_hits_once_are_those_of_shaw_and_holmes(sha
         return body, unit.scaled(amplitude)
 
     starts = 128 if kind == "flip" else None
-    once = [each for each in dynamics.periodic_orbits(*family(near), starts=starts) if each.impacts == 1.0]
+    once = [each for each in dynamics.periodic_orbits(*family(near), starts=starts) if each.impact_count == 1.0]
     assert once
     expected = [1.1 * k] if kind == "fold" else [0.98 * k]
     for orbit in once:
@@ -317,7 +317,7 @@ def test_an_orbit_near_which_nothing_grows_or_shrinks_is_neutral():
     """Without damping and impacts the multipliers of the forced motion are exp(+-2 pi i/1.3)."""
     oscillator = dynamics.ImpactOscillator(1.0, 0.8, stop=1.0)
     found = dynamics.periodic_orbits(oscillator, pulses.sine(1.0, 1.3, cycles=1), starts=64)
-    (orbit,) = (each for each in found if each.impacts == 0.0)
+    (orbit,) = (each for each in found if each.impact_count == 0.0)
     assert not orbit.is_stable and "neutral orbit of 1 period with 0 impacts" in orbit.summary()
     assert orbit.multipliers[0] == pytest.approx(np.exp(2j * math.pi / 1.3).conjugate(), abs=1e-9)
 
@@ -341,7 +341,7 @@ def test_orbits_of_a_ball_that_loses_nothing_are_never_stable():
     """Areas stay as they are, so that multipliers are a complex pair of size one, or a real one and its inverse."""
     starts = [[2.41991718e-06, -7.13992044e-03], [3.03476625e-06, 8.32868209e-03]]  # of those with many impacts
     found = dynamics.periodic_orbits(dynamics.BouncingBall(1.0), pulses.sine(1e-3, 0.7, cycles=1), starts=starts)
-    assert [each.impacts for each in found] == [617.0, 706.0]
+    assert [each.impact_count for each in found] == [617.0, 706.0]
     for orbit in found:
         assert orbit.multipliers[0].imag != 0.0
         assert np.abs(orbit.multipliers) == pytest.approx([1.0, 1.0], abs=1e-9)
@@ -354,7 +354,7 @@ def test_the_peak_of_an_orbit_between_walls_is_where_they_are():
         return dynamics.InvertedPendulum(3.0, 0.1, 0.6), pulses.sine(amplitude, 1.3, cycles=1)
 
     found = dynamics.periodic_orbits(*family(3.0), starts=64)
-    start = next(each for each in found if each.is_stable and each.impacts == 2.0)
+    start = next(each for each in found if each.is_stable and each.impact_count == 2.0)
     branch = dynamics.continue_orbit(start, family, 3.0, (2.8, 3.2))
     assert len(branch) >= 5 and branch.peaks == pytest.approx(0.1, rel=1e-14)
     axes = branch.plot().axes[0]  # which would be a flat line

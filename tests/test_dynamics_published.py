@@ -168,7 +168,7 @@ def test_branches_of_a_slender_block_bifurcate_where_closed_forms_say(ratio, res
 
     def orbits_at(level):
         found = dynamics.periodic_orbits(*family(level), period=m, model="linear")
-        return [each for each in found if each.is_stable and each.period == m and each.impacts == 2.0]
+        return [each for each in found if each.is_stable and each.period == m and each.impact_count == 2.0]
 
     (whole,) = (each for each in orbits_at(below) if each.is_symmetric)
     one_sided = next(each for each in orbits_at(level) if not each.is_symmetric)

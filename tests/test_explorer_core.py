@@ -815,11 +815,11 @@ def test_a_verdict_that_the_duration_left_open_is_not_drawn_as_standing(tmp_path
     )
     made.run()
     results = made.results()
-    assert results.stopped.values.any()
+    assert results.ended_early.values.any()
     view = StudyView(tmp_path / "cut")
     drawn = view.slice({"x": "p", "y": "scale", "quantity": "overturned"}).arrays["values"].reshape(2, 2)
     chosen = results.isel(motion=0, block=np.flatnonzero(results.alpha.values == 0.1))
-    wanted = np.where(chosen.stopped & ~chosen.overturned, -1.0, chosen.overturned)
+    wanted = np.where(chosen.ended_early & ~chosen.overturned, -1.0, chosen.overturned)
     assert np.array_equal(drawn, wanted.reshape(2, 2))
     assert (drawn == -1.0).any()
 

@@ -31,7 +31,7 @@ def test_every_slider_starts_within_its_ends():
             continue
         value = PARAMETERS["pga" if name == "sa" else name].read(parameter.default)
         assert parameter.low < in_shown_unit(parameter, value) < parameter.high, name
-        assert parameter.low > 0.0 or not parameter.logarithmic, name
+        assert parameter.low > 0.0 or not parameter.is_logarithmic, name
         judged += 1
     assert judged >= 14
 

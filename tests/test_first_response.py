@@ -78,7 +78,7 @@ chattering.chattering_report(1.05, 3.0, 0.9)
 chattering.chattering_report(8.0, 3.0, 0.9)
 motions = [motion.scaled(factor) for factor in np.linspace(0.3, 2.5, 12)]
 outcomes = [rocking.simulate(rocking.Block.from_parameters(p=2.0, alpha=0.2), each).overturned for each in motions]
-rocking.calibrate(motions, outcomes, model="linear", two_sided=False, candidates=256, seed=1)
+rocking.calibrate(motions, outcomes, model="linear", two_sided=False, candidate_count=256, seed=1)
 from rocking import dynamics
 ball, table = dynamics.BouncingBall(0.5), rocking.pulses.sine(15.0, 2.0, cycles=1)
 rock = dynamics.stroboscopic_map(ball, table)

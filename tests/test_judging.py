@@ -36,7 +36,7 @@ def test_perfect_predictions_score_zero_and_have_skill_one():
 
 
 def test_what_was_thought_nearly_impossible_has_the_least_chance():
-    found = rocking.validate(of_outcomes([1] * 12), left_out([0.02] * 12), simulations=400)
+    found = rocking.validate(of_outcomes([1] * 12), left_out([0.02] * 12), simulation_count=400)
     assert found.reliability_chance == pytest.approx(1.0 / 401.0)
 
 
@@ -91,7 +91,7 @@ def seen_by(own, rng, monkeypatch, **options):
 
     monkeypatch.setattr("rocking.calibration.outcomes.simulate_many", simulated)
     blocks = Blocks(np.full(len(fell), 2.0), 0.2, 0.9)
-    return rocking.validate(tests, blocks, simulations=200, seed=int(rng.integers(1 << 30)), **options)
+    return rocking.validate(tests, blocks, simulation_count=200, seed=int(rng.integers(1 << 30)), **options)
 
 
 def chances_are_even(chances):
@@ -132,13 +132,13 @@ def test_a_calibration_says_of_tests_what_it_predicts(coarse):
     pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
     fell = [False, False, True, True]
     calibration = rocking.calibrate(
-        pulses, fell, p=2.0, restitution=0.9, two_sided=False, candidates=128, model="linear"
+        pulses, fell, p=2.0, restitution=0.9, two_sided=False, candidate_count=128, model="linear"
     )
     tests = [ShakeTest(*pair) for pair in zip(pulses, fell, strict=True)]
     found = rocking.validate(tests, calibration)
     np.testing.assert_allclose([t.probability for t in found.tests], calibration.predict(pulses), rtol=1e-12)
     assert found.model == "linear" and found.scores.brier == pytest.approx(found.brier.value)
-    validation = calibration.cross_validate(folds=2, repeats=2)
+    validation = calibration.cross_validate(fold_count=2, repeat_count=2)
     assert [t.probability for t in rocking.validate(tests, validation).tests] == pytest.approx(
         validation.probabilities.mean(axis=0).tolist()
     )
@@ -200,7 +200,7 @@ def test_what_is_no_outcome_is_no_test(given, sentence):
         ({"tests": [STRONG]}, "tests must contain ShakeTest"),
         ({"weights": [1.0, 2.0]}, "weights must contain 1 nonnegative numbers"),
         ({"outlier_probability": 0.7}, "outlier_probability must be a number from 0 to 0.5"),
-        ({"simulations": 3}, "simulations must be a whole number of at least 100"),
+        ({"simulation_count": 3}, "simulation_count must be a whole number of at least 100"),
         ({"blocks": rocking.dynamics.BouncingBall(0.9)}, "slenderness is defined for blocks only"),
     ],
 )

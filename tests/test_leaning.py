@@ -61,7 +61,7 @@ def turning(body, response):
 def test_the_example_leans_where_tendon_and_weight_are_in_balance():
     response = leaning(EXAMPLE)
     assert response.leans
-    assert not (response.overturned or response.unfinished or response.stopped or response.ambiguous)
+    assert not (response.overturned or response.unfinished or response.ended_early or response.ambiguous)
     assert response.residual_rotation == pytest.approx(0.1962311436, abs=1e-10)
     assert response.peak_rotation == 0.22
     assert response.duration < 10.0
@@ -87,7 +87,7 @@ def test_a_body_that_leans_does_so_about_a_stable_balance_and_never_leaves_it(na
     assert moment(0.999 * at) < 0.0 < moment(1.001 * at)
     assert brentq(moment, 0.999 * at, 1.001 * at, xtol=1e-14) == pytest.approx(at, rel=1e-9)
     long = leaning(body, model, sign, duration=response.duration + 60.0)
-    assert long.stopped
+    assert long.ended_early
     assert not long.leans
     assert math.isnan(long.residual_rotation)
     later = sign * long.rotation(np.linspace(response.duration, long.duration, 4001))
@@ -141,7 +141,7 @@ def test_an_ensemble_has_the_same_ends_as_single_simulations():
     bodies = [BODIES[name] for name in ("yields", "undamped", "pushed", "with-spring")]
     dataset = rocking.simulate_many(bodies, PULSES)
     single = [[rocking.simulate(body, pulse) for body in bodies] for pulse in PULSES]
-    for name in ("leans", "overturned", "unfinished", "stopped", "peak_rotation", "peak_time", "residual_rotation"):
+    for name in ("leans", "overturned", "unfinished", "ended_early", "peak_rotation", "peak_time", "residual_rotation"):
         np.testing.assert_array_equal(dataset[name].values, [[getattr(one, name) for one in row] for row in single])
     leans, rotation = dataset.leans.values, dataset.residual_rotation.values
     assert leans.sum() == 6

@@ -81,12 +81,12 @@ RESULTS = {
 @functools.cache
 def calibrated():
     overturned = [rocking.simulate(BLOCK, one, model="linear").overturned for one in MOTIONS]
-    return rocking.calibrate(MOTIONS, overturned, model="linear", candidates=128, p=3.0, two_sided=False)
+    return rocking.calibrate(MOTIONS, overturned, model="linear", candidate_count=128, p=3.0, two_sided=False)
 
 
 @functools.cache
 def validated():
-    return calibrated().cross_validate(folds=2)
+    return calibrated().cross_validate(fold_count=2)
 
 
 @functools.cache

@@ -238,7 +238,7 @@ def bracket_by_kernel(case: Sequence) -> tuple[float, float] | None:
     start["side"], start["v"], start["direction"] = case.side, case.speed, case.direction
     start["slip_rate"], start["peak"], start["budget"] = 2.0 * case.direction, math.inf, 100_000
     start["certificate_speed"] = math.inf
-    march(prepare_ground(None, bodies.gravity), run.records[0], run.settings, table, state.create_scratch(), start)
+    march(prepare_ground(None, bodies.gravity), run.structs[0], run.settings, table, state.create_scratch(), start)
     if not start["sequences"] or not table["sequence"]["upper"][0] >= 0.0:
         return None
     return float(table["sequence"]["lower"][0]), float(table["sequence"]["upper"][0])
@@ -400,10 +400,10 @@ def test_a_duration_stops_a_slide() -> None:
     block = rocking.Block(width=0.5, height=1.8)
     motion = rocking.pulses.one_sine(amplitude=5.0, frequency=2.0)
     whole, cut = (rocking.simulate(block, motion, friction=0.25, duration=end) for end in (None, 0.2))
-    assert cut.stopped and cut.outcome == "has not overturned" and cut.duration == 0.2
+    assert cut.ended_early and cut.outcome == "has not overturned" and cut.duration == 0.2
     assert cut.residual_slip == pytest.approx(float(whole.slip(0.2)), abs=1e-15)
     data = rocking.simulate_many(block, motion, friction=0.25, duration=0.2)
-    assert bool(data.stopped.item()) and float(data.residual_slip.item()) == cut.residual_slip
+    assert bool(data.ended_early.item()) and float(data.residual_slip.item()) == cut.residual_slip
 
 
 def test_outputs_contain_the_slip(tmp_path: Any, run: Any) -> None:

@@ -480,7 +480,7 @@ COLUMNS = [
         "time_at_rest_s",
         "complete_chattering",
     ),
-    *("rests_by_rounding", "leans", "unfinished", "stopped"),
+    *("rests_by_rounding", "leans", "unfinished", "ended_early"),
 ]
 
 

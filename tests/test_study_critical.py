@@ -49,7 +49,7 @@ def test_changes_lie_between_neighbouring_scales_whose_verdicts_are_known(comple
         study = rocking.create_study(tmp_path, BLOCKS, MOTIONS, **OPTIONS, duration=duration, blocks_per_batch=512)
         study.run()
     found, results = study.critical_scales(verdict), study.results()
-    known = ~(results.unfinished | results.stopped).values
+    known = ~(results.unfinished | results.ended_early).values
     holds = results.overturned.values
     if verdict == "complete_chattering":
         known = (known | (results.rests > 0).values) & (results.rests_by_rounding == 0).values
@@ -76,7 +76,7 @@ def test_a_change_with_unknown_verdicts_inside_lies_between_the_known_ones(tmp_p
     with rocking.set_options(threads=1):
         study.run()
     results, found = study.results(), study.critical_scales()
-    assert results.stopped.values.ravel().tolist() == [False, False, True, True, False, False]
+    assert results.ended_early.values.ravel().tolist() == [False, False, True, True, False, False]
     assert results.overturned.values.ravel().tolist() == [False, False, False, False, True, True]
     assert (found.low.values.tolist(), found.high.values.tolist()) == ([1.0], [6.0])
     assert (found.overturns.values.tolist(), found.known.values.tolist()) == ([True], [False])

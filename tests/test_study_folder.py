@@ -53,13 +53,13 @@ def test_the_umask_decides_who_may_read_a_study(tmp_path: Path, umask: int, mode
 @pytest.mark.parametrize("other", [False, True])
 def test_one_process_runs_a_study_or_several_run_parts_of_it(tmp_path: Path, one: bool, other: bool) -> None:
     for _ in range(2):  # a lock that was given back locks nothing
-        with lock_folder(tmp_path, shared=one):
+        with lock_folder(tmp_path, is_shared=one):
             if one and other:
-                with lock_folder(tmp_path, shared=other):
+                with lock_folder(tmp_path, is_shared=other):
                     pass
             else:
                 told = rf"run by process {os.getpid()} on .*; wait until it ends, or stop it there"
-                with pytest.raises(StudyError, match=told), lock_folder(tmp_path, shared=other):
+                with pytest.raises(StudyError, match=told), lock_folder(tmp_path, is_shared=other):
                     pass
 
 
@@ -68,7 +68,7 @@ def test_one_process_runs_a_study_or_several_run_parts_of_it(tmp_path: Path, one
 def test_a_lock_goes_with_its_process_and_the_next_run_removes_half_written_files(tmp_path: Path, shared: bool) -> None:
     program = (
         "import sys, time\nfrom rocking.studies.folder import lock_folder\n"
-        f"with lock_folder(sys.argv[1], shared={shared}):\n    print('locked', flush=True)\n    time.sleep(600)\n"
+        f"with lock_folder(sys.argv[1], is_shared={shared}):\n    print('locked', flush=True)\n    time.sleep(600)\n"
     )
     part = tmp_path / ".abc.part"
     part.write_bytes(b"half")

@@ -223,12 +223,12 @@ def test_a_duration_within_the_vertical_component_leaves_the_verdict_open(second
     motion = Motion.from_samples(np.zeros(11), 0.1).with_vertical(Motion.from_samples(np.zeros(31), 0.1))
     block = block_for(2.0, 0.2)
     response = rocking.simulate(block, motion, duration=seconds)
-    assert response.stopped
+    assert response.ended_early
     assert "has not moved by" in response.summary()
-    assert bool(rocking.simulate_many(rocking.Blocks.from_bodies([block]), motion, duration=seconds).stopped.item())
+    assert bool(rocking.simulate_many(rocking.Blocks.from_bodies([block]), motion, duration=seconds).ended_early.item())
     over = rocking.simulate(block, motion, duration=3.0)
-    assert not over.stopped
-    assert not bool(rocking.simulate_many(rocking.Blocks.from_bodies([block]), motion, duration=3.0).stopped.item())
+    assert not over.ended_early
+    assert not bool(rocking.simulate_many(rocking.Blocks.from_bodies([block]), motion, duration=3.0).ended_early.item())
 
 
 @pytest.mark.parametrize("push", [1e-15, -1e-15])

@@ -295,7 +295,7 @@ class StudyError(RockingError):
     See Also
     --------
     rocking.create_study : Create a study in a folder.
-    rocking.errors.DamagedStudyError : Report a damaged unit of a study.
+    rocking.errors.DamagedStudyError : Report a damaged batch of a study.
 
     Examples
     --------
@@ -308,7 +308,7 @@ class StudyError(RockingError):
 
 
 class DamagedStudyError(StudyError):
-    """A unit of a study is damaged and can be recomputed. The message names the unit and the fault.
+    """A batch of a study is damaged and can be recomputed. The message names the batch and the fault.
 
     See Also
     --------
@@ -321,11 +321,11 @@ class DamagedStudyError(StudyError):
     >>> folder = pathlib.Path(tempfile.mkdtemp())
     >>> block, pulse = rocking.Block(width=0.4, height=2.0), rocking.pulses.one_sine(4.0, 1.0)
     >>> _ = rocking.create_study(folder, block, pulse).run()
-    >>> _ = (folder / "units" / "unit.0.0.0.0").write_bytes(b"damaged")
+    >>> _ = (folder / "batches" / "batch.0.0.0.0").write_bytes(b"damaged")
     >>> rocking.Study(folder).results().load()
     Traceback (most recent call last):
         ...
-    rocking.errors.DamagedStudyError: unit unit.0.0.0.0 is damaged: the study's verify(repair=True) computes it again
+    rocking.errors.DamagedStudyError: batch batch.0.0.0.0 is damaged: the study's verify(repair=True) computes it again
     """
 
     def __str__(self) -> str:

@@ -223,7 +223,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         coordinate = "record" if "record" in data.coords else "motion"
         rows = [
             [label, *([names[b]] * has_several_blocks), levels.describe_bands(self.bands(block=b, motion=m))]
-            for m, label in enumerate(create_motion_labels(data, coordinate, with_history=False))
+            for m, label in enumerate(create_motion_labels(data, coordinate, includes_history=False))
             for b in range(block_count)
         ]
         blocks = format_count(block_count, "block") if has_several_blocks else data.blocks
@@ -271,7 +271,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         levels = data.level.scale * data.level.values
         peaks = data.peak_over_alpha.isel(block=block).transpose("motion", "level").values
         motions = []
-        for m, label in enumerate(create_motion_labels(data, with_history=False)):
+        for m, label in enumerate(create_motion_labels(data, includes_history=False)):
             bands = data.level.scale * np.array(self.bands(block=block, motion=m)).reshape(-1, 2)
             motions.append(ScaledMotion(label, levels, peaks[m], np.where(np.isnan(bands), levels[[0, -1]], bands)))
         block_text = data.blocks if data.sizes["block"] == 1 else list_block_names(data)[block]

@@ -54,11 +54,11 @@ def _is_missing(label: object) -> bool:
     return is_none or label == "" or (isinstance(label, float) and math.isnan(label))
 
 
-def create_motion_labels(data: xr.Dataset, coordinate: str = "motion", *, with_history: bool = True) -> list[str]:
+def create_motion_labels(data: xr.Dataset, coordinate: str = "motion", *, includes_history: bool = True) -> list[str]:
     """Compose labels of motions or records, with vertical components and processing."""
     names = data[coordinate].values
     verticals = data.vertical.values if "vertical" in data.coords else [""] * len(names)
-    histories = data.histories if with_history else [""] * len(names)
+    histories = data.histories if includes_history else [""] * len(names)
     return [
         create_label(str(name), history.split("; ") if history else [], str(vertical))
         for name, history, vertical in zip(names, histories, verticals, strict=True)

@@ -164,7 +164,9 @@ class Survey(BlocksUnderRecords):
         return f"{self._format_headline()}\n\n{table}"
 
     def _format_headline(self) -> str:
-        undecided = sum(item.stopped or item.unfinished or not item.perturbed().is_decided for item in self.responses)
+        undecided = sum(
+            item.ended_early or item.unfinished or not item.perturbed().is_decided for item in self.responses
+        )
         undecided_text = f", undecided under {undecided}" if undecided else ""
         skipped_text = f"; {format_count(len(self.skipped), 'record')} skipped" if self.skipped else ""
         return super()._format_headline() + undecided_text + skipped_text
@@ -406,7 +408,7 @@ def _create_row(response: Response, precision: float) -> dict[str, Any]:
         "precision": precision,
         "overturned_share_at_precision": float(within_precision.overturned.mean()),
         "unfinished": response.unfinished,
-        "stopped": response.stopped,
+        "ended_early": response.ended_early,
         "leans": response.leans,
         "ambiguous": response.ambiguous,
         add_unit("overturn_time", "s"): response.overturn_time,

@@ -130,7 +130,7 @@ def assess(
     check_measure(hazard, intensity)
     named, unusable = index_motions(motions), dict[str, str]()
     failed = dict(blocks.failures) if isinstance(blocks, Inventory) else {}
-    is_usable = [_check_intensity(name, motion, intensity, unusable) for name, motion in named.items()]
+    is_usable = [_is_scalable(name, motion, intensity, unusable) for name, motion in named.items()]
     usable = dict(compress(named.items(), is_usable))
     if not usable:
         raise OptionError(escape_braces(f"no motion can be scaled; the first: {next(iter(unusable.values()))}"))
@@ -159,7 +159,7 @@ def assess(
     return Assessment(tuple(objects), usable, intensity, hazard, failed, unusable, years, confidence, model, data)
 
 
-def _check_intensity(name: str, motion: Motion, measure: Measure, unusable: dict[str, str]) -> bool:
+def _is_scalable(name: str, motion: Motion, measure: Measure, unusable: dict[str, str]) -> bool:
     """Whether a motion can be scaled; otherwise add the reason."""
     try:
         measure.require_positive_value(motion, name)

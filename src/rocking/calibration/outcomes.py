@@ -86,7 +86,7 @@ class Validation:
     ----------
     probabilities : ndarray, shape (repeats, m)
         Probability of overturning in each test, from the fit to the other folds.
-    repeats : tuple of Scores
+    scores_by_repeat : tuple of Scores
         Scores of each repeat.
 
     See Also
@@ -103,17 +103,17 @@ class Validation:
     """
 
     probabilities: Floats
-    repeats: tuple[Scores, ...]
+    scores_by_repeat: tuple[Scores, ...]
 
     def __repr__(self) -> str:
-        repeats, tests = self.probabilities.shape
-        times = "once" if repeats == 1 else f"{repeats} times"
+        repeat_count, tests = self.probabilities.shape
+        times = "once" if repeat_count == 1 else f"{repeat_count} times"
         return f"<Validation: {format_count(tests, 'test')}, each left out {times}: {self.scores}>"
 
     @property
     def scores(self) -> Scores:
         """Mean scores of the repeats."""
-        return Scores(*np.mean([astuple(scores) for scores in self.repeats], axis=0).tolist())
+        return Scores(*np.mean([astuple(scores) for scores in self.scores_by_repeat], axis=0).tolist())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -151,7 +151,7 @@ class Calibration(Result):
     --------
     >>> import rocking
     >>> pulses = [rocking.pulses.one_sine(amplitude, 1.0) for amplitude in (2.0, 5.0)]
-    >>> fitted = rocking.calibrate(pulses, [0, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+    >>> fitted = rocking.calibrate(pulses, [0, 1], p=2.0, restitution=0.9, two_sided=False, candidate_count=128)
     >>> list(fitted.estimates), f"{fitted.weights.sum():.2f}"
     (['alpha'], '1.00')
     """
@@ -188,7 +188,7 @@ class Calibration(Result):
         )
 
     def cross_validate(
-        self, *, groups: Sequence[object] | None = None, folds: int = 10, repeats: int = 1, seed: int = 0
+        self, *, groups: Sequence[object] | None = None, fold_count: int = 10, repeat_count: int = 1, seed: int = 0
     ) -> Validation:
         """Predict every test from fits without it.
 
@@ -197,7 +197,7 @@ class Calibration(Result):
         groups : sequence, optional
             Labels of the motions. Tests with one label, such as scaled versions of one source motion, are left out
             together.
-        folds, repeats : int
+        fold_count, repeat_count : int
             Number of parts, and of random divisions into parts.
         seed : int
             Seed of the divisions.
@@ -212,13 +212,13 @@ class Calibration(Result):
         OptionError
             If there are fewer groups than folds, or the labels do not match the motions.
         """
-        labels = label_groups(groups, len(self.observed), folds)
+        labels = label_groups(groups, len(self.observed), fold_count)
         rng = np.random.default_rng(checks.integer(seed, "seed", OptionError, 0))
         evidence = replace(self._evidence)
-        probabilities = np.empty((checks.integer(repeats, "repeats", OptionError, 1), len(self.observed)))
+        probabilities = np.empty((checks.integer(repeat_count, "repeat_count", OptionError, 1), len(self.observed)))
         for row in probabilities:
-            fold_numbers = rng.permutation(np.arange(labels.max() + 1) % folds)[labels]
-            for fold in range(folds):
+            fold_numbers = rng.permutation(np.arange(labels.max() + 1) % fold_count)[labels]
+            for fold in range(fold_count):
                 is_left_out = fold_numbers == fold
                 fitted, predicted = evidence.select_tests(~is_left_out), evidence.select_tests(is_left_out)
                 populations = sample_posterior(fitted, DRAW_COUNT, MOVE_ROUNDS, rng)
@@ -319,10 +319,10 @@ def compute_probabilities(share: Floats, effective: float, outlier_probability: 
     return np.clip(with_outliers(expected, outlier_probability), 0.0, 1.0)
 
 
-def label_groups(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
+def label_groups(groups: Sequence[object] | None, count: int, fold_count: int) -> NDArray[np.int64]:
     """Assign a group number, from 0, to each motion. By default each motion is a group."""
     labels = assign_groups(range(count) if groups is None else groups, "groups", count)
-    checks.integer(folds, "folds", OptionError, 2, int(labels.max()) + 1)
+    checks.integer(fold_count, "fold_count", OptionError, 2, int(labels.max()) + 1)
     return labels
 
 
@@ -336,7 +336,7 @@ def calibrate(
     restitution: ValueOrBounds = (0.3, 0.999),
     two_sided: bool = True,
     outlier_probability: float = 0.005,
-    candidates: int = 8192,
+    candidate_count: int = 8192,
     max_blocks: int = 1000,
     seed: int = 0,
 ) -> Calibration:
@@ -361,7 +361,7 @@ def calibrate(
         `calibrate_history`, because few specimens are symmetric and outcomes alone would not reveal this.
     outlier_probability : float
         Probability that an outcome does not come from a rocking block.
-    candidates : int
+    candidate_count : int
         Approximate number of blocks simulated under every distinct motion, up to twice as many if runs disagree or few
         represent a typical population.
     max_blocks : int
@@ -401,7 +401,7 @@ def calibrate(
     --------
     >>> import rocking
     >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
-    >>> calibration = calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+    >>> calibration = calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidate_count=128)
     >>> bool(calibration.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
     True
     """
@@ -409,7 +409,7 @@ def calibrate(
     observed = check_outcomes(overturned, len(motion_list))
     space = Space.from_bounds(p, alpha, restitution, two_sided=checks.boolean(two_sided, "two_sided", OptionError))
     checks.fraction(outlier_probability, "outlier_probability", OptionError, below=0.5)
-    checks.integer(candidates, "candidates", OptionError, 128)
+    checks.integer(candidate_count, "candidate_count", OptionError, 128)
     checks.integer(max_blocks, "max_blocks", OptionError, 1)
     rng = np.random.default_rng(checks.integer(seed, "seed", OptionError, 0))
     distinct, motion_indices = find_distinct_motions(motion_list)
@@ -417,7 +417,7 @@ def calibrate(
     def simulate_points(points: Floats) -> NDArray[np.float32]:
         return np.take(simulate_outcomes(space.blocks(points), distinct, model), motion_indices, axis=1)
 
-    result = search(Problem(space, observed, outlier_probability, simulate_points), candidates, rng)
+    result = search(Problem(space, observed, outlier_probability, simulate_points), candidate_count, rng)
     evidence = result.evidence
     populations = sample_posterior(evidence, 2 * DRAW_COUNT, MOVE_ROUNDS, rng)
     weights = evidence.mean_weights(populations)

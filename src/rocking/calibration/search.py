@@ -273,9 +273,9 @@ class SearchResult:
         return {name: compute_r_hat(np.array([populations[name] for populations in centres])) for name in centres[0]}
 
 
-def search(problem: Problem, candidates: int, rng: Generator) -> SearchResult:
+def search(problem: Problem, candidate_count: int, rng: Generator) -> SearchResult:
     """Simulate about this many candidates, up to twice as many while runs disagree or few represent the posterior."""
-    part_size = max(candidates // (RUN_COUNT * (_FILLING_PARTS + len(_ANNEALING_EXPONENTS))), 1)
+    part_size = max(candidate_count // (RUN_COUNT * (_FILLING_PARTS + len(_ANNEALING_EXPONENTS))), 1)
     streams = rng.spawn(RUN_COUNT)
     runs: Sequence[Candidates] = [problem.fill_space(_FILLING_PARTS * part_size, stream) for stream in streams]
     result = _extend_runs(problem, runs, _ANNEALING_EXPONENTS, part_size, streams)

@@ -297,8 +297,8 @@ def validate(
     weights: ArrayLike | None = None,
     model: Model | None = None,
     outlier_probability: float | None = None,
-    bins: int = 10,
-    simulations: int = 2000,
+    bin_count: int = 10,
+    simulation_count: int = 2000,
     seed: int = 0,
 ) -> ModelValidation:
     """Compare the predictions of blocks with the outcomes of tests.
@@ -316,9 +316,9 @@ def validate(
         Equation of motion, by default the model of a calibration, otherwise nonlinear.
     outlier_probability : float, optional
         Probability that an outcome does not come from a rocking block, by default from a calibration, otherwise 0.
-    bins : int
+    bin_count : int
         Number of bins of the reliability diagram, of equal width.
-    simulations, seed : int
+    simulation_count, seed : int
         Number of independent draws from the predictions for the bands and `reliability_chance`, and their seed.
 
     Returns
@@ -365,8 +365,8 @@ def validate(
         if not isinstance(test, ShakeTest):
             message = f"{{}} must contain ShakeTest(motion, overturned); got {checks.short_repr(test)}"
             raise OptionError(message, "tests", value=test)
-    checks.integer(bins, "bins", OptionError, 1, 1000)
-    checks.integer(simulations, "simulations", OptionError, 100)
+    checks.integer(bin_count, "bin_count", OptionError, 1, 1000)
+    checks.integer(simulation_count, "simulation_count", OptionError, 100)
     rng = np.random.default_rng(checks.integer(seed, "seed", OptionError, 0))
     if outlier_probability is not None:
         checks.between(outlier_probability, "outlier_probability", OptionError, 0.0, 0.5)
@@ -393,8 +393,8 @@ def validate(
             effective = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
         overturned = simulate_outcomes(bodies, distinct, equation)
         probabilities = compute_probabilities(shares @ overturned, effective, outlier_probability or 0.0)[indices]
-    outcomes = rng.random((simulations, len(items))) < probabilities
-    bin_indices = np.minimum((probabilities * bins).astype(np.int64), bins - 1)
+    outcomes = rng.random((simulation_count, len(items))) < probabilities
+    bin_indices = np.minimum((probabilities * bin_count).astype(np.int64), bin_count - 1)
     terms = compute_miscalibration(probabilities, np.vstack([observed, outcomes]), bin_indices)
     # Summation order changes the last digits.
     larger_count = np.count_nonzero(terms[1:] >= terms[0] - 1e-9 * abs(terms[0]))
@@ -405,13 +405,13 @@ def validate(
         # At most 5 % of the simulated shares are beyond each end.
         band = np.quantile(outcomes[:, in_bin].mean(axis=1), (0.05, 0.95), method="inverted_cdf").tolist()
         shares = float(probabilities[in_bin].mean()), float(observed[in_bin].mean())
-        reliability.append(ReliabilityBin(k / bins, (k + 1) / bins, int(in_bin.sum()), *shares, *band))
+        reliability.append(ReliabilityBin(k / bin_count, (k + 1) / bin_count, int(in_bin.sum()), *shares, *band))
     return ModelValidation(
         tests=tuple(PredictedTest(name, test.motion.name, test.overturned, chance) for name, test, chance in rows),
         brier=compute_score((probabilities - observed) ** 2, observed, lambda share: share * (1.0 - share), clusters),
         log_loss=compute_score(compute_log_losses(probabilities, observed), observed, _compute_entropy, clusters),
         reliability=tuple(reliability),
-        reliability_chance=float((1.0 + larger_count) / (simulations + 1.0)),
+        reliability_chance=float((1.0 + larger_count) / (simulation_count + 1.0)),
         description=description,
         model=equation,
     )

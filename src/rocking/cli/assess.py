@@ -68,7 +68,7 @@ def assess(
     settings |= {"polarity": polarity, "clusters": risk.parse_clusters(), "confidence": risk.confidence}
     with output.folder() as folder:
         objects = read_labelled(inventory, keep_going=True, expected=("name", "friction"))
-        loaded = replace(motion, keep_going=True).read_all(names, with_pairs=True)
+        loaded = replace(motion, keep_going=True).read_all(names, accepts_pairs=True)
         result = assess_objects(objects, loaded.motions, hazard=curve, years=risk.years, samples=samples, **settings)
         skipped = {name: reason.removeprefix(name).lstrip(",: ") for name, reason in loaded.skipped.items()}
         result = replace(result, skipped=skipped | {**result.skipped})

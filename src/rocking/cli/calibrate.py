@@ -45,8 +45,8 @@ def calibrate(
     alpha: str | None = None,
     restitution: str | None = None,
     two_sided: bool | None = None,
-    candidates: Annotated[int, READ_INTEGER] = _DEFAULT_CANDIDATE_COUNT,
-    folds: Annotated[int, READ_INTEGER] = 0,
+    candidate_count: Annotated[int, READ_INTEGER] = _DEFAULT_CANDIDATE_COUNT,
+    fold_count: Annotated[int, READ_INTEGER] = 0,
     predict: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = (),
     motion: str | None = None,
     initial_rotation: str | None = None,
@@ -76,9 +76,9 @@ def calibrate(
         sides are treated as one rectangle).
     two_sided
         Whether the two sides of the block may differ. By default yes for outcomes, no for a history.
-    candidates
+    candidate_count
         Outcomes: approximate number of blocks to try. More are tried if the runs disagree.
-    folds
+    fold_count
         Outcomes: number of folds for cross-validation; 0: none. Tests of one group stay together.
     predict
         Outcomes: records to predict, files or names of shipped records. Use --pulse for pulses.
@@ -100,7 +100,11 @@ def calibrate(
         table = read_calibration(data, **file.read_metadata(), **file.read_corrections())
         conflicting: dict[str, object] = {"motion": motion, "initial_rotation": initial_rotation}
         if isinstance(table, MeasuredHistory):
-            conflicting = {"predict": predict, "folds": folds, "candidates": candidates != _DEFAULT_CANDIDATE_COUNT}
+            conflicting = {
+                "predict": predict,
+                "fold_count": fold_count,
+                "candidate_count": candidate_count != _DEFAULT_CANDIDATE_COUNT,
+            }
         for name in [name for name, value in conflicting.items() if value]:
             kinds = ("outcomes", "a history") if isinstance(table, MeasuredHistory) else ("a history", "outcomes")
             raise OptionError(f"{{}} requires a table of {kinds[0]}, but this table contains {kinds[1]}", name)
@@ -116,11 +120,11 @@ def calibrate(
         else:
             # Invalid outcomes, and more folds than groups, are rejected before the computation.
             overturned = check_outcomes([test.overturned for test in table], len(table)).tolist()
-            if folds:
-                label_groups([test.group for test in table], len(table), folds)
-            arguments |= {"candidates": candidates, "seed": seed}
+            if fold_count:
+                label_groups([test.group for test in table], len(table), fold_count)
+            arguments |= {"candidate_count": candidate_count, "seed": seed}
             result = calibration = run_calibration([test.motion for test in table], overturned, **arguments)
-            numbers, text = _summarise_calibration(calibration, table, motions, folds)
+            numbers, text = _summarise_calibration(calibration, table, motions, fold_count)
             if folder is not None:
                 calibration.to_csv(folder / "ensemble.csv")
         if folder is not None:
@@ -137,15 +141,15 @@ def _read_motions(records: Sequence[str], file: ScaledPulseOptions, option: str)
 
 
 def _summarise_calibration(
-    calibration: Calibration, tests: Sequence[ShakeTest], motions: Mapping[str, Motion], folds: int
+    calibration: Calibration, tests: Sequence[ShakeTest], motions: Mapping[str, Motion], fold_count: int
 ) -> tuple[dict[str, Any], str]:
     """Summarise a calibration as numbers and text, optionally with predictions and a cross-validation."""
     predicted = dict(zip(motions, calibration.predict([*motions.values()]), strict=True))
     numbers, parts = {**calibration.to_dict(), "predicted": predicted}, [calibration.summary()]
-    if folds:
-        scores = calibration.cross_validate(groups=[test.group for test in tests], folds=folds).scores
+    if fold_count:
+        scores = calibration.cross_validate(groups=[test.group for test in tests], fold_count=fold_count).scores
         numbers["cross_validated"] = asdict(scores)
-        parts.append(f"left-out motions: {scores} ({format_count(folds, 'fold')})")
+        parts.append(f"left-out motions: {scores} ({format_count(fold_count, 'fold')})")
     if predicted:
         rows = [(name, float(probability)) for name, probability in predicted.items()]
         parts.append("\n" + format_table(["motion", "probability"], rows))
@@ -156,7 +160,7 @@ def validate(
     tests: Path,
     *,
     outlier_probability: float | None = None,
-    bins: Annotated[int, READ_INTEGER] = 10,
+    bin_count: Annotated[int, READ_INTEGER] = 10,
     seed: Annotated[int, READ_INTEGER] = 0,
     block: Annotated[EnsembleOptions, BLOCK_OPTIONS] = EnsembleOptions(),
     file: Annotated[FileOptions, RECORD_OPTIONS] = FileOptions(),
@@ -175,14 +179,14 @@ def validate(
         CSV table of tests.
     outlier_probability
         Probability that an outcome is unrelated to the rocking of the block, by default 0.
-    bins
+    bin_count
         Number of bins of the reliability diagram.
     seed
         Seed of the simulations for bands and probabilities.
     """
     with output.folder() as folder:
         rows = read_tests(tests, **file.read_metadata(), **file.read_corrections())
-        options: dict[str, Any] = {"outlier_probability": outlier_probability, "bins": bins, "seed": seed}
+        options: dict[str, Any] = {"outlier_probability": outlier_probability, "bin_count": bin_count, "seed": seed}
         validation = run_validation(rows, **block.create_block_arguments(model), **options)
         result = validation.to_dict()
         if folder is not None:

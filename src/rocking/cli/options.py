@@ -352,7 +352,7 @@ class _RecordOptions(FileOptions):
     component: Annotated[ComponentName, Parameter(help=_COMPONENT_HELP)] = "own"
     reversed: Annotated[bool, Parameter(negative="", help="Also use every motion reversed (x -1).")] = False
 
-    def read_all(self, names: Sequence[str], *, with_pairs: bool = False) -> LoadedRecords:
+    def read_all(self, names: Sequence[str], *, accepts_pairs: bool = False) -> LoadedRecords:
         """Return the motions by name, with pairs those of all horizontal components."""
         records, pulses = expand_record_names(names), self.supplied_texts().get("pulse", ())
         stochastic = self.create_stochastic_motions()
@@ -361,7 +361,7 @@ class _RecordOptions(FileOptions):
             raise OptionError(message, "pulse", "stochastic")
         has_channel_names = "channel" in self.supplied_texts() or self.supplied_texts().get("vertical", OWN) != OWN
         if self.component != "own" or (
-            with_pairs and records and not has_channel_names and STANDARD_INPUT not in records
+            accepts_pairs and records and not has_channel_names and STANDARD_INPUT not in records
         ):
             return self._load_pairs(records, [*pulses, *stochastic], has_channel_names=has_channel_names)
         pulse_motions = self.create_pulses()

@@ -46,7 +46,7 @@ class OutputOptions(PrintOptions):
 
     def folder(self) -> AbstractContextManager[Path | None]:
         """Create the folder, if any; on failure, remove it if empty."""
-        return nullcontext() if self.out is None else open_output_folder(self.out, listed=not self.as_json)
+        return nullcontext() if self.out is None else open_output_folder(self.out, lists_files=not self.as_json)
 
 
 def write_results(folder: Path, *, figures: Mapping[str, Callable[[], Figure]], result: Mapping[str, Any]) -> None:
@@ -80,10 +80,10 @@ def print_result(result: Mapping[str, Any], text: str, *, as_json: bool) -> None
 
 
 @contextmanager
-def open_output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
+def open_output_folder(folder: Path, *, lists_files: bool = False) -> Iterator[Path]:
     """Create a folder for results and report the written files; on failure, remove new empty folders.
 
-    Replaced files are noted. If `listed`, the written files are printed.
+    Replaced files are noted. If `lists_files`, the written files are printed.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def open_output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
         yield folder
         new_times = _read_modification_times(folder)
         written = [name for name, time in new_times.items() if old_times.get(name) != time]
-        if listed:
+        if lists_files:
             print(f"\nwritten to {folder}: {', '.join(sorted({Path(name).parts[0] for name in written}))}")
         if replaced := [name for name in written if name in old_times]:
             note(f"replaced in {folder}: {', '.join(replaced)}")

@@ -225,7 +225,7 @@ def report(
     checks.fraction(confidence, "confidence", OptionError)
     study, results = Study(folder), dict[str, Result]()
     fit = study.fragility if together else study.block_fragilities
-    with open_output_folder(out or Path(folder) / "report", listed=not output.as_json) as target:
+    with open_output_folder(out or Path(folder) / "report", lists_files=not output.as_json) as target:
         with skip_on_error("fragility", FitError):
             results["fragility"] = fit(
                 measure=intensity_measure, limit_states=limits, confidence=confidence, larger=larger

@@ -101,7 +101,7 @@ class Branch(Result):
         Coordinate and velocity at the start of a period.
     multipliers : ndarray of complex, shape (n, 2)
         Floquet multipliers, the largest first.
-    impacts : float
+    impact_count : float
         Number of impacts in one period, constant along the branch; infinity with complete chattering.
     peaks : ndarray, shape (n,)
         Largest absolute coordinates.
@@ -138,7 +138,7 @@ class Branch(Result):
     values: Floats
     states: Floats
     multipliers: NDArray[np.complex128]
-    impacts: float
+    impact_count: float
     peaks: Floats
     bifurcations: tuple[Bifurcation, ...]
     ends: tuple[str, str]
@@ -158,7 +158,8 @@ class Branch(Result):
         return create_orbit(StroboscopicMap(body, motion, self.model, self.chattering), self.states[index], self.period)
 
     def _format_headline(self) -> str:
-        impacts = "complete chattering" if math.isinf(self.impacts) else format_count(int(self.impacts), "impact")
+        count = self.impact_count
+        impacts = "complete chattering" if math.isinf(count) else format_count(int(count), "impact")
         low, high = float(self.values.min()), float(self.values.max())
         unit = "" if self.unit == "1" else f" {self.unit}"
         orbits = f"orbits of {format_count(self.period, 'period')} with {impacts}"
@@ -178,8 +179,8 @@ class Branch(Result):
             "parameter": self.name,
             "unit": self.unit,
             "period": self.period,
-            "impacts": self.impacts,
-            "complete_chattering": math.isinf(self.impacts),
+            "impact_count": self.impact_count,
+            "complete_chattering": math.isinf(self.impact_count),
             "values": self.values,
             "states": self.states,
             "stable": self.is_stable,

@@ -36,16 +36,16 @@ from rocking.kernels.state import Struct, Structs
 from rocking.kernels.uplift import write_completeness
 from rocking.motion.motion import Motion
 
-#: Fields of an outcome. ``unfinished``: the step budget was exceeded. ``stopped``: the duration ended while the body
-#: moved or the motion continued. In both cases all other fields are incomplete. ``leans``: restraints hold the body in
-#: a leaning position for ever. ``lost_contact``: the ground no longer presses on it, where the simulation ends.
+#: Fields of an outcome. ``unfinished``: the step budget was exceeded. ``ended_early``: the duration ended while the
+#: body moved or the motion continued. In both cases all other fields are incomplete. ``leans``: restraints hold the
+#: body in a leaning position for ever. ``lost_contact``: the ground no longer presses on it, where the simulation ends.
 #: ``largest_slip``, ``residual_slip``: displacement of the base relative to the ground, m.
 #: ``residual_rotation``: final rotation, NaN if unknown. ``complete_chattering``: the body
 #: rested after its first uplift before the motion exceeded a threshold again. ``rests_by_rounding``: number of rests
 #: because time no longer advanced. Times of events that did not occur are 0.
 OUTCOME_DTYPE = np.dtype(
     [
-        ("overturned", "?"), ("unfinished", "?"), ("stopped", "?"), ("leans", "?"), ("lost_contact", "?"),
+        ("overturned", "?"), ("unfinished", "?"), ("ended_early", "?"), ("leans", "?"), ("lost_contact", "?"),
         ("peak_rotation", "f8"), ("residual_rotation", "f8"), ("peak_time", "f8"),
         ("impacts", "i8"), ("uplifts", "i8"), ("rests", "i8"), ("time_at_rest", "f8"), ("first_uplift", "f8"),
         ("first_rest", "f8"), ("last_rest", "f8"), ("complete_chattering", "?"), ("rests_by_rounding", "i8"),
@@ -241,7 +241,7 @@ def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = 
             complete[indices] = detect_complete_chattering(*batch)
     outcomes = _collect_outcomes(states, np.array([motion.end for motion in task.motions])[motion_indices])
     outcomes["peak_rotation"] = compute_peaks(states, structs, bodies.stops)
-    is_known = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"] | outcomes["lost_contact"])
+    is_known = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["ended_early"] | outcomes["lost_contact"])
     side = states["side"]
     stop = np.where((side == 1) | (side == -2), bodies.stops[:, 1], bodies.stops[:, 0])
     outcomes["residual_rotation"] = np.where(is_known, stop + (1.0 - 2.0 * side) * states["leaning_rotation"], np.nan)
@@ -355,7 +355,7 @@ def _collect_outcomes(states: Structs, motion_end: Floats) -> NDArray[np.void]:
     is_early = (states["side"] >= 0) | (states["direction"] != 0) | (states["end_time"] < motion_end)
     # A body that remains balanced also has no outcome.
     is_undecided = (states["status"] == state.MarchStatus.DONE) | (states["status"] == state.MarchStatus.BALANCED)
-    outcomes["stopped"] = is_undecided & is_early
+    outcomes["ended_early"] = is_undecided & is_early
     for name, field in (
         ("peak_rotation", "peak"), ("peak_time", "peak_time"), ("impacts", "impacts"), ("uplifts", "uplifts"),
         ("rests", "rests"), ("time_at_rest", "time_at_rest"), ("first_uplift", "first_uplift"),

@@ -132,10 +132,10 @@ def describe_outcome(response: Response) -> str:
     text = format_outcome(response, f"{response.tipping_time:.2f} s, and lies flat at {response.overturn_time:.2f} s")
     if not perturbed.is_decided:
         text = perturbed.describe_outcome()
-    elif response.moved and not (response.overturned or response.unfinished or response.stopped):
+    elif response.moved and not (response.overturned or response.unfinished or response.ended_early):
         # Two digits, or four near 100 %, where they matter.
         text = f"It {text}: it reaches {100.0 * ratio:.{2 if ratio < 0.99 else 4}g} % of the overturning rotation"
-    elif not (response.unfinished or response.stopped):
+    elif not (response.unfinished or response.ended_early):
         text = f"It {text}"
     return f"{text[0].upper()}{text[1:]}."
 

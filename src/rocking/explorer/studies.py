@@ -102,7 +102,7 @@ class StudyView:
         results = results.isel({name: position for name, position in positions.items() if name in results.dims})
         values = results[quantity]
         if quantity == "overturned":
-            is_open = (results.unfinished + results.stopped > 0) & (values == 0)
+            is_open = (results.unfinished + results.ended_early > 0) & (values == 0)
             values = values.astype(float).where(~is_open, UNDECIDED)
         order = [name for name in ("motion", "scale", *self._grid) if name in (x, y)]
         by_dimension = values.transpose(*[name for name in ("motion", "scale", "block") if name in values.dims])

@@ -51,7 +51,7 @@ class Input:
         (several).
     help : str
         Help of its option.
-    unit, default, low, high, logarithmic, step : str, str, float, float, bool, float
+    unit, default, low, high, is_logarithmic, step : str, str, float, float, bool, float
         Field of the page: displayed unit, initial text, limits of the slider in that unit, whether the slider is
         logarithmic, and its step if not a thousandth of its range.
     arity : str
@@ -70,7 +70,7 @@ class Input:
     default: str = ""
     low: float = 0.0
     high: float = 0.0
-    logarithmic: bool = False
+    is_logarithmic: bool = False
     arity: Literal["one", "one or two", "two"] = "one"
     step: float = 0.0
     text: str = ""
@@ -118,7 +118,7 @@ class Input:
 
     def describe(self) -> dict[str, Any]:
         """Return the properties that the page requires, in plain values."""
-        names = ("name", "group", "unit", "default", "low", "high", "logarithmic", "arity", "step")
+        names = ("name", "group", "unit", "default", "low", "high", "is_logarithmic", "arity", "step")
         plain = {name: getattr(self, name) for name in names}
         kind = "angle" if self.kind == "tilt" else self.kind
         return {

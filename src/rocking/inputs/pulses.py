@@ -18,8 +18,8 @@ from rocking.motion.motion import Motion
 
 def _declare(name: str, kind: str, unit: str, default: str, low: float, high: float, text: str = "") -> Input:
     """Declare a parameter of pulses, with a logarithmic slider if possible."""
-    logarithmic = low > 0.0 and name not in ("cycles", "gamma")
-    return Input(name, "pulse", kind, "", unit, default, low, high, logarithmic, text=text or f"pulse_{name}")
+    is_logarithmic = low > 0.0 and name not in ("cycles", "gamma")
+    return Input(name, "pulse", kind, "", unit, default, low, high, is_logarithmic, text=text or f"pulse_{name}")
 
 
 #: Parameters of pulses, each declared once for all pulses.

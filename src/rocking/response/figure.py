@@ -108,7 +108,7 @@ def draw_histories(
     sequence = _find_longest_sequence(response, *span) if longest_sequence and options.get("ax") is None else None
     traces = _compute_traces(response, *span)
     with open_page((7.0, 4.4 + (len(traces) > 1) + 1.4 * (sequence is not None)), **options) as page:
-        main, *grounds = _create_panels(page, 1 + len(traces), zoomed=sequence is not None)
+        main, *grounds = _create_panels(page, 1 + len(traces), has_zoom=sequence is not None)
         _shade_rest(main, np.clip(response.rest_intervals, *span))
         _shade_slip(main, np.clip(response._history.find_slips(), *span))
         _draw_rotation(main, time, scaled_rotation, np.array([-minus, plus]) * factors[::-1], coordinate.limit_name)
@@ -165,10 +165,10 @@ def _find_longest_sequence(response: ResponseData, start: float, end: float) -> 
     return longest if _crop(response.impacts["time"], longest["start"], longest["end"]).size > 1 else None
 
 
-def _create_panels(page: Page, count: int, *, zoomed: bool) -> list[Axes]:
+def _create_panels(page: Page, count: int, *, has_zoom: bool) -> list[Axes]:
     """Return the panels of rotation and motion, above the panel of the chattering sequence."""
-    heights = [*(1.3, 1.0, 0.7, 0.7)[:count]] + [1.0] * zoomed
-    panels = page.create_panels(";".join("RGVS"[:count] + "Z" * zoomed), height_ratios=heights)
+    heights = [*(1.3, 1.0, 0.7, 0.7)[:count]] + [1.0] * has_zoom
+    panels = page.create_panels(";".join("RGVS"[:count] + "Z" * has_zoom), height_ratios=heights)
     for axes in panels[1:count]:
         axes.sharex(panels[0])
     return panels[:count]

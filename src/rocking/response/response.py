@@ -159,7 +159,7 @@ class Response(ResponseData):
         flags = [
             "overturned",
             "unfinished",
-            "stopped",
+            "ended_early",
             "leans",
             *(["lost_contact"] if self.friction is not None else []),
         ]

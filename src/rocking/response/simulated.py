@@ -176,7 +176,7 @@ class ResponseData(Result):
     def outcome(self) -> str:
         """Outcome as a verb: "overturns", "stands", "leans", "does not move".
 
-        Further outcomes are "comes to rest" (for a body that cannot overturn), "has not overturned" (`stopped`) and
+        Further outcomes are "comes to rest" (for a body that cannot overturn), "has not overturned" (`ended_early`) and
         "is given up" (`unfinished`).
         """
         if self.overturned:
@@ -185,7 +185,7 @@ class ResponseData(Result):
             return "is given up"
         if self.lost_contact:
             return "loses contact"
-        if self.stopped:
+        if self.ended_early:
             return "has not overturned"
         if self.leans:
             return "leans"
@@ -199,11 +199,11 @@ class ResponseData(Result):
 
         NaN if the block overturns or its final state is unknown. For other bodies the coordinate.
         """
-        is_unknown = self.overturned or self.unfinished or self.stopped or self.lost_contact
+        is_unknown = self.overturned or self.unfinished or self.ended_early or self.lost_contact
         return math.nan if is_unknown else self.solution.residual
 
     @property
-    def stopped(self) -> bool:
+    def ended_early(self) -> bool:
         """Whether `duration` ended the simulation while the block or the ground still moved."""
         motion_ended = self.motion is None or self.duration >= self.motion.end
         is_decided = self.overturned or self.unfinished or self.leans or self.lost_contact

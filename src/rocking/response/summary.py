@@ -112,7 +112,7 @@ def format_outcome(response: ResponseData, overturn_time: str) -> str:
         return f"UNFINISHED: given up at {response.duration:.4f} s, after too many steps"
     if response.lost_contact:
         return f"loses contact with the ground at {response.duration:.4f} s, where the simulation ends"
-    if response.stopped:
+    if response.ended_early:
         motion_end = 0.0 if response.motion is None else response.motion.end
         to_come = f"; the motion goes on to {motion_end:.6g} s" if response.duration < motion_end else ""
         return f"{_describe_stop(response)}, where the simulation was stopped{to_come}"
@@ -137,7 +137,7 @@ def format_brief_outcome(response: ResponseData, precision: float) -> str:
         text += f" at {time}"
     elif response.leans:
         text += f" at {_format_residual(response)}"
-    elif response.stopped:
+    elif response.ended_early:
         text = _describe_stop(response) if perturbed.is_decided else text
     parts = []
     for repeats in (perturbed, within_precision):
@@ -270,7 +270,7 @@ def _describe_outcome(response: ResponseData) -> str:
     text = response.perturbed().describe_outcome()
     if response.overturned:
         text += f", at {format_time(response.overturn_time, *response.perturbed().overturn_range)}"
-    elif response.unfinished or response.stopped or response.lost_contact:
+    elif response.unfinished or response.ended_early or response.lost_contact:
         text += f"; {format_outcome(response, '')}"
     if response.rests_by_rounding:
         text += f"; {format_count(response.rests_by_rounding, 'rest')} not proven"

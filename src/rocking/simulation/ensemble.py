@@ -58,7 +58,7 @@ VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
     "rests_by_rounding": ("1", "rests that were not proven, as time no longer advanced between impacts"),
     "leans": ("1", "whether restraints hold the block leaning for ever"),
     "unfinished": ("1", "whether the simulation was given up after too many steps; the rest is as far as it came"),
-    "stopped": ("1",
+    "ended_early": ("1",
         "whether the duration ended it while the block moved or the motion went on, and left the verdict open"),
 }  # fmt: skip
 
@@ -401,10 +401,10 @@ def simulate_many(
         Dimensions (motion, scale, polarity, block), as far as they apply. Variables: overturned, peak_rotation (rad),
         peak_time (s), impacts (without those after a certificate), uplifts, rests, time_at_rest (s),
         complete_chattering (whether the block came to rest after its first uplift before the motion passed a threshold
-        again), rests_by_rounding (rests without a certificate), unfinished, and stopped (by `duration`, which leaves
-        overturned undetermined). `include_times` adds first_uplift, first_rest and last_rest (s, or 0 without such an
-        event). `robust` adds overturned_share, the share of the five simulations that overturn. Shares other than 0 and
-        1 are undecided. Coordinates contain the names of the motions and the parameters of the blocks.
+        again), rests_by_rounding (rests without a certificate), unfinished, and ended_early (by `duration`, which then
+        leaves overturned undetermined). `include_times` adds first_uplift, first_rest and last_rest (s, or 0 without
+        such an event). `robust` adds overturned_share, the share of the five simulations that overturn. Shares other than
+        0 and 1 are undecided. Coordinates contain the names of the motions and the parameters of the blocks.
 
     See Also
     --------

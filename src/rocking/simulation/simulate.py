@@ -65,7 +65,7 @@ def simulate(
     duration : float, optional
         End of the simulation, s. By default the simulation continues beyond the motion until rest, overturning, or
         proof that restraints hold the block leaning for ever. A response cut during the motion of ground or block is
-        `stopped`, with undetermined outcome.
+        `ended_early`, with undetermined outcome.
     initial_rotation, initial_velocity : float
         Initial rotation (rad, positive to side +) and angular velocity (rad/s), or coordinate and rate of another body.
     friction : float or pair, optional

@@ -43,15 +43,15 @@ from rocking.studies.batches import (
 if sys.platform == "win32":
     import msvcrt
 
-    def _lock(file: IO[bytes], shared: bool) -> None:
-        if not shared:  # only exclusive locks exist
+    def _lock(file: IO[bytes], is_shared: bool) -> None:
+        if not is_shared:  # only exclusive locks exist
             file.seek(0)
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
 else:
     import fcntl
 
-    def _lock(file: IO[bytes], shared: bool) -> None:
-        fcntl.flock(file, fcntl.LOCK_NB | (fcntl.LOCK_SH if shared else fcntl.LOCK_EX))
+    def _lock(file: IO[bytes], is_shared: bool) -> None:
+        fcntl.flock(file, fcntl.LOCK_NB | (fcntl.LOCK_SH if is_shared else fcntl.LOCK_EX))
 
 
 #: File that describes a study; its number increases when other versions cannot read it.
@@ -216,7 +216,7 @@ def write_atomically(file: Path, data: bytes) -> None:
 
 
 @contextlib.contextmanager
-def lock_folder(path: str | Path, *, shared: bool = False) -> Iterator[None]:
+def lock_folder(path: str | Path, *, is_shared: bool = False) -> Iterator[None]:
     """Lock a folder, exclusively or shared with runs of other parts."""
     folder = check_folder(path)
     with _convert_errors("locked", folder / "lock"):
@@ -225,7 +225,7 @@ def lock_folder(path: str | Path, *, shared: bool = False) -> Iterator[None]:
     with file:
         with _convert_errors("locked", folder / "lock"):
             try:
-                _lock(file, shared)
+                _lock(file, is_shared)
             except (BlockingIOError, PermissionError):
                 # On Windows the locked byte is unreadable, so the name begins at the second byte.
                 file.seek(1)
@@ -234,7 +234,7 @@ def lock_folder(path: str | Path, *, shared: bool = False) -> Iterator[None]:
                 raise StudyError(message, path=str(folder)) from None
             file.truncate(0)
             file.write(f" process {os.getpid()} on {socket.gethostname()}".encode())
-            for remains in () if shared else folder.rglob(".*.part*"):  # remains of a killed process
+            for remains in () if is_shared else folder.rglob(".*.part*"):  # remains of a killed process
                 remains.unlink(missing_ok=True)
         yield
 

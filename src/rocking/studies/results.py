@@ -192,12 +192,14 @@ def find_critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     if product.scales.count < 2 or not np.all(np.diff(levels) > 0.0):
         raise OptionError("critical scales require at least two scales, in increasing order")
     store.require_complete()
-    names = ["unfinished", "stopped", "overturned", "complete_chattering", "rests", "rests_by_rounding"]
+    names = ["unfinished", "ended_early", "overturned", "complete_chattering", "rests", "rests_by_rounding"]
     has_outcome, is_known = np.empty(store.grid.shape, bool), np.empty(store.grid.shape, bool)
     for part in split_range(len(product.motions), store.grid.batch_shape[0]):
         outcomes = _read_selection(store, names, True, (part, _ALL, _ALL, _ALL))
-        unfinished, stopped, overturned, completes, rests, rests_by_rounding = (values != 0.0 for values in outcomes)
-        has_outcome[part], is_known[part] = overturned, ~(unfinished | stopped)
+        unfinished, ended_early, overturned, completes, rests, rests_by_rounding = (
+            values != 0.0 for values in outcomes
+        )
+        has_outcome[part], is_known[part] = overturned, ~(unfinished | ended_early)
         if outcome == "complete_chattering":
             has_outcome[part], is_known[part] = completes, (is_known[part] | rests) & ~rests_by_rounding
     # Unknown outcomes inherit the last known one below, so that no change is lost.
@@ -237,12 +239,12 @@ def _iterate_peak_ratios(store: Store, larger: Measure | None = None) -> Iterato
     store.require_complete()
     *sizes, count = store.product.shape
     polarities = slice(0, 1 if store.product.bodies.is_symmetric else None)
-    names = ["peak_rotation", "overturned", "unfinished", "stopped"]
+    names = ["peak_rotation", "overturned", "unfinished", "ended_early"]
     for blocks in split_range(count, max(1, _MAX_IN_MEMORY // math.prod(sizes))):
         selection = _ALL, _ALL, polarities, blocks
-        peak, overturned, unfinished, stopped = _read_selection(store, names, True, selection)
-        if stopped.any():
-            count_text = f"{np.count_nonzero(stopped)} of {stopped.size} simulations"
+        peak, overturned, unfinished, ended_early = _read_selection(store, names, True, selection)
+        if ended_early.any():
+            count_text = f"{np.count_nonzero(ended_early)} of {ended_early.size} simulations"
             message = "were stopped by the study's duration, while the block moved or the motion went on, so that their"
             raise StudyError(f"{count_text} {message} outcomes are unknown: create the study without a duration")
         alpha = compute_slenderness(store.product.bodies.select(blocks))

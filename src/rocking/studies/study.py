@@ -205,7 +205,7 @@ class Study:
         """
         first, step = (1, 1) if part is None else _parse_part(part)
         self._store.check_program()
-        with lock_folder(self.folder, shared=part is not None):
+        with lock_folder(self.folder, is_shared=part is not None):
             share = [*itertools.islice(self._store.grid, first - 1, None, step)]
             return _run_batches(self._store, share, executor)
 
@@ -505,8 +505,8 @@ def _run_batches(store: Store, share: Sequence[Key], executor: Any) -> RunReport
         finally:
             for future in pending:
                 future.cancel()
-    stopped = stop.is_set() and batches + len(failed) < len(missing)
-    return RunReport(batches, simulations, time.monotonic() - start, failed, stopped)
+    ended_early = stop.is_set() and batches + len(failed) < len(missing)
+    return RunReport(batches, simulations, time.monotonic() - start, failed, ended_early)
 
 
 @contextlib.contextmanager

@@ -61,8 +61,8 @@ export class Field {
     if (!isTyped(this.field)) this.field.value = text ? words : "";
     if (this.optional && known !== undefined) this.field.placeholder = words;
     if (!Number.isFinite(values[0])) return;
-    const {low, high, logarithmic} = this.spec, [value] = values;
-    const part = logarithmic ? Math.log(Math.max(value, 1e-300) / low) / Math.log(high / low) : (value - low) / (high - low);
+    const {low, high, is_logarithmic} = this.spec, [value] = values;
+    const part = is_logarithmic ? Math.log(Math.max(value, 1e-300) / low) / Math.log(high / low) : (value - low) / (high - low);
     this.slider.value = String(Math.round(this.steps * Math.min(1, Math.max(0, part))));
     this.slider.setAttribute("aria-valuetext", `${words} ${this.spec.unit}`.trim());
   }
@@ -71,8 +71,8 @@ export class Field {
   value(text = this.text) { return measured(text, this.spec.units); }
 
   slid() {
-    const {low, high, logarithmic, suffix} = this.spec.own ?? this.spec, part = Number(this.slider.value) / this.steps; // rounded in its own unit
-    const value = Number((logarithmic ? low * (high / low) ** part : low + part * (high - low)).toPrecision(3));
+    const {low, high, is_logarithmic, suffix} = this.spec.own ?? this.spec, part = Number(this.slider.value) / this.steps; // rounded in its own unit
+    const value = Number((is_logarithmic ? low * (high / low) ** part : low + part * (high - low)).toPrecision(3));
     this.show(value + suffix + (this.spec.arity === "two" ? `,${value}${suffix}` : ""));
     this.changed();
   }

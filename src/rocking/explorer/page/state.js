@@ -7,7 +7,7 @@ import {known, phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 /** @typedef {{view: string, texts: Texts, other: Texts | null, window: [number, number] | null, at: number | null, map: Texts, sweep: Texts, assessment: Texts}} State */
-/** @typedef {{name: string, label: string, group: string, kind: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, step: number, arity: string, text: string, argument: string, about: string, own?: Parameter}} Parameter */
+/** @typedef {{name: string, label: string, group: string, kind: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, is_logarithmic: boolean, step: number, arity: string, text: string, argument: string, about: string, own?: Parameter}} Parameter */
 
 export const VIEWS = ["shake", "map", "periodic", "assess"];
 
