@@ -27,7 +27,7 @@ def shaken(ratio):
 # %%
 # The orbit of one bounce a period is followed to where a multiplier of its map is -1:
 
-orbit = next(each for each in dynamics.periodic_orbits(*shaken(1.2)) if each.is_stable and each.impacts == 1)
+orbit = next(each for each in dynamics.periodic_orbits(*shaken(1.2)) if each.is_stable and each.impact_count == 1)
 branch = dynamics.continue_orbit(orbit, shaken, 1.2, (1.1, 1.6))
 (doubling,) = (each.value for each in branch.bifurcations if each.kind == "flip")
 closed_form = np.hypot(np.pi * (1.0 - e) / (1.0 + e), 2.0 * (1.0 + e * e) / (1.0 + e) ** 2)

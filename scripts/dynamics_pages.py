@@ -41,7 +41,7 @@ def shaken(block, ratio, model="linear"):
 def stable_orbits(family, level, period, model):
     """Stable orbits with two impacts in so many periods."""
     found = dynamics.periodic_orbits(*family(level), period=period, model=model)
-    return [each for each in found if each.is_stable and each.period == period and each.impacts == 2.0]
+    return [each for each in found if each.is_stable and each.period == period and each.impact_count == 2.0]
 
 
 def hogan_branches():

@@ -403,8 +403,8 @@ def simulate_many(
         complete_chattering (whether the block came to rest after its first uplift before the motion passed a threshold
         again), rests_by_rounding (rests without a certificate), unfinished, and ended_early (by `duration`, which then
         leaves overturned undetermined). `include_times` adds first_uplift, first_rest and last_rest (s, or 0 without
-        such an event). `robust` adds overturned_share, the share of the five simulations that overturn. Shares other than
-        0 and 1 are undecided. Coordinates contain the names of the motions and the parameters of the blocks.
+        such an event). `robust` adds overturned_share, the share of the five simulations that overturn. Shares other
+        than 0 and 1 are undecided. Coordinates contain the names of the motions and the parameters of the blocks.
 
     See Also
     --------
