@@ -42,7 +42,7 @@ def test_an_inventory_is_the_same_however_it_is_written(tmp_path, text):
 def test_a_workbook_is_read_as_its_csv(tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()
-    for row in [["Inventory"], [], ["Object", "Width (cm)", "Height (m)", "Value (EUR)"], ["vase", 24, 1.1, 125000]]:
+    for row in [["Inventory"], [], ["Object", "Breadth (cm)", "Height (m)", "Value (EUR)"], ["vase", 24, 1.1, 125000]]:
         book.active.append(row)
     book.active.append(["stele", "40 ± 1", "2,0"])
     book.save(tmp_path / "inventory.xlsx")

@@ -45,12 +45,14 @@ def turning(body, response):
     linear = response.model == "linear"
 
     def moment(u):
-        own = (1.0 + of["sine"]) * math.sin(of["alpha"] - u) + of["cosine"] * math.cos(of["alpha"] - u)
+        own = (1.0 + of["sine_coefficient"]) * math.sin(of["alpha"] - u) + of["cosine_coefficient"] * math.cos(
+            of["alpha"] - u
+        )
         if linear:
-            own = of["alpha"] - u + of["sine"] * (math.sin(of["alpha"]) - math.cos(of["alpha"]) * u)
-            own += of["cosine"] * (math.cos(of["alpha"]) + math.sin(of["alpha"]) * u)
+            own = of["alpha"] - u + of["sine_coefficient"] * (math.sin(of["alpha"]) - math.cos(of["alpha"]) * u)
+            own += of["cosine_coefficient"] * (math.cos(of["alpha"]) + math.sin(of["alpha"]) * u)
         stretch = of["lever_arm"] * (u if linear else 2.0 * math.sin(0.5 * u)) - plastic - of["slack_elongation"]
-        pull = of["prestress"] + of["stiffness"] * min(
+        pull = of["prestress"] + of["tendon_stiffness"] * min(
             max(stretch, 0.0), of["yield_elongation"] - of["slack_elongation"]
         )
         return of["p"] ** 2 * (own + pull * (1.0 if linear else math.cos(0.5 * u)) + of["spring"] * u)

@@ -273,5 +273,7 @@ def test_blocks_of_all_kinds_are_simulated_together_as_alone():
     limits = np.zeros((4, 2))
     for model in ("nonlinear", "linear"):
         assert np.array_equal(again.create_kernel_structs(model, limits), gathered.create_kernel_structs(model, limits))
-    with pytest.raises(BlockError, match="blocks have no parameter stif; the terms of restraints are sine, cosine"):
+    with pytest.raises(
+        BlockError, match="blocks have no parameter stif; the terms of restraints are sine_coefficient, cosine_coef"
+    ):
         rocking.Blocks(1.0, 0.2, 0.9, stif=3.0)

@@ -27,13 +27,13 @@ _PARAMETER_NAMES: Final = ("p", "alpha", "restitution")
 #: Terms of restraints on each side with their default values, and `one_sided`.
 _TERM_DEFAULTS: Final = {**RestraintTerms()._asdict(), "one_sided": 0.0}
 _UNITS: Final = {
-    "p": "rad/s", "alpha": "rad", "damping": "1/s", "lever_arm": "m", "stiffness": "1/m", "yield_elongation": "m",
-    "slack_elongation": "m", "restitution_slope": "s/rad",
+    "p": "rad/s", "alpha": "rad", "damping": "1/s", "lever_arm": "m", "tendon_stiffness": "1/m",
+    "yield_elongation": "m", "slack_elongation": "m", "restitution_slope": "s/rad",
 }  # fmt: skip
 
 #: Exponents of the factor on p in the terms of a resized block; other terms do not change.
 _SIZE_EXPONENTS: Final = {
-    "damping": 1, "stiffness": 2, "lever_arm": -2, "yield_elongation": -2, "slack_elongation": -2,
+    "damping": 1, "tendon_stiffness": 2, "lever_arm": -2, "yield_elongation": -2, "slack_elongation": -2,
     "restitution_slope": -1,
 }  # fmt: skip
 
@@ -343,29 +343,30 @@ class Blocks:
         structs["variable_restitution"] = (structs["seed"] >= 0) | np.any(structs["restitution_slope"] > 0.0, axis=1)
         structs["prestress"], structs["spring"] = p * p * terms["prestress"], p * p * terms["spring"]
         structs["damping"] = terms["damping"]
-        moment = terms["sine"] * sine + terms["cosine"] * cosine  # at u = 0
-        slope = terms["sine"] * cosine - terms["cosine"] * sine
+        sine_term, cosine_term = terms["sine_coefficient"], terms["cosine_coefficient"]
+        moment = sine_term * sine + cosine_term * cosine  # at u = 0
+        slope = sine_term * cosine - cosine_term * sine
         # The moment of a tendon without prestress is zero here apart from rounding.
-        moment[np.abs(moment) <= 1e-14 * (np.abs(terms["sine"] * sine) + np.abs(terms["cosine"] * cosine))] = 0.0
+        moment[np.abs(moment) <= 1e-14 * (np.abs(sine_term * sine) + np.abs(cosine_term * cosine))] = 0.0
         gain = 1.0 if model == "linear" else cosine  # gain divided by p^2
         structs["restraint_threshold"] = (moment + terms["prestress"]) / gain
         if model == "linear":
             structs["added_weight"], structs["added_push"] = slope, moment - self.alpha * slope
         else:
-            structs["added_weight"], structs["added_push"] = terms["sine"], terms["cosine"]
-        structs["yielding"] = np.any(terms["stiffness"] > 0.0, axis=1)
+            structs["added_weight"], structs["added_push"] = sine_term, cosine_term
+        structs["yielding"] = np.any(terms["tendon_stiffness"] > 0.0, axis=1)
         if np.any(structs["yielding"]):  # a yielding tendon is initially elastic
             for name in ("added_weight", "added_push", "prestress", "restraint_threshold"):
                 structs[f"base_{name.removeprefix('added_')}"] = structs[name]
-            structs["tendon_stiffness"] = p * p * terms["stiffness"]
+            structs["tendon_stiffness"] = p * p * terms["tendon_stiffness"]
             structs["lever_arm"] = terms["lever_arm"]
             structs["yield_elongation"], structs["slack_elongation"] = (
                 terms["yield_elongation"][:, 0],
                 terms["slack_elongation"][:, 0],
             )
             tendon_moment, slack_moment = (
-                terms["stiffness"] * terms["lever_arm"],
-                -terms["stiffness"] * terms["slack_elongation"],
+                terms["tendon_stiffness"] * terms["lever_arm"],
+                -terms["tendon_stiffness"] * terms["slack_elongation"],
             )
             structs["tendon_weight"] = -tendon_moment * (1.0 if model == "linear" else cosine)
             structs["tendon_push"] = tendon_moment * (self.alpha if model == "linear" else sine)

@@ -301,9 +301,10 @@ def _compute_balance(side: Side, terms: RestraintTerms) -> float:
         return side.alpha
 
     def moment(u: float) -> float:
-        weight_moment = (1.0 + terms.sine) * math.sin(side.alpha - u) + terms.cosine * math.cos(side.alpha - u)
+        sine, cosine = math.sin(side.alpha - u), math.cos(side.alpha - u)
         elongation = min(2.0 * terms.lever_arm * math.sin(0.5 * u), terms.yield_elongation) - terms.slack_elongation
-        return weight_moment + (terms.prestress + terms.stiffness * elongation) * math.cos(0.5 * u) + terms.spring * u
+        tendon = (terms.prestress + terms.tendon_stiffness * elongation) * math.cos(0.5 * u)
+        return (1.0 + terms.sine_coefficient) * sine + terms.cosine_coefficient * cosine + tendon + terms.spring * u
 
     rotations = np.linspace(0.0, 0.5 * math.pi, _N_SAMPLES)
     values = np.array([moment(u) for u in rotations.tolist()])

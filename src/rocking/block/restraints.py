@@ -23,22 +23,23 @@ _LARGEST_SEED: Final = 2**53
 
 
 class RestraintTerms(NamedTuple):
-    """RestraintTerms of restraints and of a law of restitution on one side, at a rotation u and a rate u'.
+    """Terms of restraints and of a law of restitution on one side, at a rotation u and a rate u'.
 
     The moment of the restraints about the pivot, positive if it restores the block, divided by weight times R, is
 
-        sine sin(alpha - u) + cosine cos(alpha - u) + prestress cos(u/2) + spring u + (damping/p^2) u'
+        sine_coefficient sin(alpha - u) + cosine_coefficient cos(alpha - u) + prestress cos(u/2) + spring u
+        + (damping/p^2) u'
 
     plus the moment of a yielding tendon.
     """
 
-    sine: float = 0.0
-    cosine: float = 0.0
+    sine_coefficient: float = 0.0
+    cosine_coefficient: float = 0.0
     prestress: float = 0.0
     spring: float = 0.0
     damping: float = 0.0  # 1/s
     lever_arm: float = 0.0  # distance of the yielding tendon's duct from the pivot, m
-    stiffness: float = 0.0  # its stiffness times that distance, divided by weight times R, 1/m
+    tendon_stiffness: float = 0.0  # its stiffness times that distance, divided by weight times R, 1/m
     yield_elongation: float = math.inf  # elongation beyond the plastic one at which it yields, m
     slack_elongation: float = 0.0  # elongation above which it is taut, m
     min_restitution: float = 0.0  # lower bound of a varying restitution
@@ -188,7 +189,7 @@ class Tendon(Restraint):
             yields, slack = (self.strength - self.prestress) / self.stiffness, -self.prestress / self.stiffness
             return RestraintTerms(
                 lever_arm=x,
-                stiffness=self.stiffness * x / pivot.moment,
+                tendon_stiffness=self.stiffness * x / pivot.moment,
                 yield_elongation=yields,
                 slack_elongation=slack,
             )

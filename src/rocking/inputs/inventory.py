@@ -257,7 +257,7 @@ def _read_rows(file: Path, expected: Collection[str]) -> tuple[list[_Heading], l
 def _read_heading(cell: str) -> _Heading:
     """Interpret a heading: the name of an input and its unit, or a label."""
     text = cell.lower().replace("±", f" {_DEVIATION_SUFFIX} ").replace("+-", f" {_DEVIATION_SUFFIX} ").replace("²", "2")
-    plain = re.sub(r"[^\w°]+|_+", "_", text).strip("_")
+    plain = re.sub(r"[^\w°]+|_+", "_", text).strip("_").replace("breadth", "width")
     for name in sorted(_INPUTS_BY_HEADING, key=len, reverse=True):
         if plain == name or plain.startswith(f"{name}_"):
             declared_input, unit = INPUTS[_INPUTS_BY_HEADING[name]], normalise_spelling(plain[len(name) + 1 :])

@@ -196,7 +196,7 @@ def list_density_notes(densities: Sequence[float | None]) -> tuple[str, ...]:
 
 def list_restraint_notes(body: RestrainedBlock) -> tuple[str, ...]:
     """Return likely mistakes in the restraints of a block; empty if there are none."""
-    strongest = max(max(*map(abs, terms[:4]), terms.stiffness * terms.lever_arm) for terms in body._terms)
+    strongest = max(max(*map(abs, terms[:4]), terms.tendon_stiffness * terms.lever_arm) for terms in body._terms)
     if strongest <= _MAX_MOMENT:
         return ()
     return (f"what a restraint does is {strongest:.2g} times the weight or more: are forces in N, and masses in kg?",)
