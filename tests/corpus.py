@@ -662,14 +662,6 @@ def rules_of_thumb() -> Iterator[Item]:
     yield from of_result(rocking.rules.compare_rules(STATUE, motions, **QUIET))
 
 
-@group(digits=6, fast=False)
-def roses() -> Iterator[Item]:
-    statue = rocking.Solid.from_mesh("statue", density={"plinth": 2700.0, "figure": 2650.0, "head": 2650.0})
-    pairs = {"meloland": (record(), record("el-centro-meloland-360"))}
-    options = {"azimuths": [0.0, 60.0, 130.0], "levels": [0.3, 0.6], "measure": "pgv", "recorded": (270.0, 0.0)}
-    yield from of_result(rocking.response_rose(statue, pairs, **options, **QUIET))
-
-
 # Calibrations
 
 

@@ -30,7 +30,7 @@ from rocking.plot.curves import (
     draw_spectrum,
     draw_survival,
 )
-from rocking.plot.maps import draw_basins, draw_outcome_map, draw_regions, draw_rose, draw_shares
+from rocking.plot.maps import draw_basins, draw_outcome_map, draw_regions, draw_rose
 from rocking.plot.orbits import draw_bifurcation, draw_branches, draw_intervals, draw_orbit
 
 COLUMN, PAGE = 86.0 / 25.4, 174.0 / 25.4
@@ -73,13 +73,6 @@ def rose_of(**options):
     corners = np.array([[0.3, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.3, -0.3]])
     each = {"acceleration": values, "slenderness": 60.0 * values, "p": 3.0 - values}
     return draw_rose(azimuth=azimuth, support=corners, weakest=(90.0, 0.3), **each, **options)
-
-
-def shares_of(**options):
-    azimuth = np.arange(0.0, 360.0, 15.0)
-    shares = np.array([0.2, 0.4, 0.7, 1.0])[:, None] * np.abs(np.cos(np.deg2rad(azimuth)))
-    labels = [f"peak ground velocity {level:g} m/s" for level in (0.4, 0.8, 1.2, 2.0)]
-    return draw_shares(azimuth=azimuth, shares=shares, labels=labels, **options)
 
 
 def map_of(**options):

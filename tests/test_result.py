@@ -17,7 +17,6 @@ from rocking.calibration.outcomes import simulate_outcomes
 from rocking.chattering import chattering_map, critical_amplitude_nonlinear, families
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult
-from rocking.core.tables import format_count
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSE = rocking.pulses.one_sine(6.0, 1.0)
@@ -81,20 +80,6 @@ def test_a_map_has_a_mode_for_what_was_given_up():
     assert "not finished" in found.summary()
     assert f"note: {ONE_MISSING}" in found.summary()
     found.plot()
-
-
-@pytest.mark.usefixtures("small_budget")
-def test_a_rose_leaves_out_what_was_given_up():
-    solid = rocking.Solid.from_mesh("statue")
-    pulses = PULSE, rocking.pulses.one_sine(2.0, 0.8)
-    pair = tuple(pulses[0].rotated(pulses[1], azimuth, recorded=(90.0, 0.0)) for azimuth in (90.0, 0.0))
-    found = rocking.response_rose(solid, [pair], azimuths=[45.0], levels=[0.6, 0.9, 1.2], restitution=1.0 - 1e-9)
-    missing, fell = np.isnan(found.data.peak_over_slenderness.values.ravel()), found.data.overturned.values.ravel()
-    assert missing.tolist() == [False, True, False]
-    assert fell.tolist() == [False, False, True]
-    for shares in (found.data.overturned_share.values.ravel(), found.data.anywhere.values):
-        np.testing.assert_array_equal(shares, [0.0, np.nan, 1.0])
-    assert f"{format_count(missing.sum(), 'simulation')} given up after too many steps" in found.summary()
 
 
 @pytest.mark.thorough
@@ -172,7 +157,6 @@ def results(bars, spectrum, study):
         "IncrementalDynamicAnalysis": rocking.incremental_dynamic_analysis(BLOCK, PULSE),
         "MeasureComparison": rocking.compare_measures(BLOCK, [PULSE, rocking.pulses.one_sine(6.0, 2.0)]),
         "ResistanceRose": statue.rose(),
-        "ResponseRose": rocking.response_rose(statue, [(PULSE, PULSE)], azimuths=[0.0, 90.0], recorded=(0.0, 90.0)),
         "ChatteringMap": chattering_map(families.sine(BLOCK), {"a": [1.01, 1.1], "omega": [2.0, 3.0]}),
         "BlockTable": study.block_fragilities(),
         "Basins": dynamics.basins(BLOCK, ONE_PERIOD, np.linspace(-0.2, 0.2, 5), np.linspace(-0.4, 0.4, 5)),
@@ -206,7 +190,7 @@ def test_every_bar_comes_to_its_end(results, bars):
 
 @pytest.mark.parametrize("written", [3, pytest.param(10, marks=pytest.mark.thorough)])
 def test_a_result_keeps_its_dataset_and_offers_nothing_of_it_as_its_own(results, tmp_path, written):
-    assert len(results) == 10
+    assert len(results) == 9
     for number, found in enumerate(results.values()):
         for again in (copy.copy(found), pickle.loads(pickle.dumps(found))):
             assert again.data.identical(found.data)
@@ -259,9 +243,6 @@ HEADERS = {
         "rose",
     ): "azimuth_deg,acceleration_g,alpha_rad,p_rad_s,restitution,radius_m,rise_m,coupling,lateral_offset_m,gap_m",
     ("ResistanceRose", "support"): "east_m,north_m",
-    ("ResponseRose", "responses"): "pair,level,azimuth_deg,overturned,peak_over_slenderness",
-    ("ResponseRose", "shares"): "level,azimuth_deg,overturned_share",
-    ("ResponseRose", "levels"): "level,anywhere",
     ("RockingSpectrum", "fractiles"): "fractile,alpha_rad,restitution,p_rad_s,period_s,size_m,"
     "fractile_over_alpha,overturned_share",
     ("RockingSpectrum", "peaks"): f"motion,alpha_rad,restitution,p_rad_s,{PULSES},period_s,size_m,"
@@ -374,7 +355,7 @@ def test_a_part_has_no_numbers_of_the_whole(results, of_several):
         ("RockingSpectrum", "motion"), ("IncrementalDynamicAnalysis", "motion"), ("MeasureComparison", "motion"),
         ("RockingSpectrum of several", "block"), ("MeasureComparison", "block"),
         ("IncrementalDynamicAnalysis", "level"),
-        ("ResponseRose", "pair"), ("ResponseRose", "azimuth"), ("Basins", "attractor"), ("Basins", "rotation"),
+        ("Basins", "attractor"), ("Basins", "rotation"),
         ("Basins", "angular_velocity"),
     ):  # fmt: skip
         assert dimension in results[name].data.sizes, name

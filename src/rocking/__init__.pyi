@@ -14,7 +14,6 @@ from . import (
     studies,
 )
 from .analysis.critical import critical_scale
-from .analysis.directions import response_rose
 from .analysis.efficiency import compare_measures
 from .analysis.fragility import Fragility, fit_fragility, fragility
 from .analysis.hazard import HazardCurve
@@ -126,7 +125,6 @@ __all__ = [
     "read_tests",
     "records",
     "response",
-    "response_rose",
     "rocking_spectrum",
     "rules",
     "set_options",

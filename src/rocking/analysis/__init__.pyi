@@ -1,6 +1,5 @@
 from .critical import CriticalScale
 from .curve import FragilityCurve
-from .directions import ResponseRose
 from .efficiency import MeasureComparison
 from .incremental import IncrementalDynamicAnalysis
 from .overturning import OverturningMap, OverturningMode, mode_name
@@ -19,7 +18,6 @@ __all__ = [
     "OverturningMode",
     "Probit",
     "Rate",
-    "ResponseRose",
     "Risk",
     "RockingSpectrum",
     "Survey",

@@ -20,7 +20,6 @@ from rocking.plot.canvas import (
     FigureOptions,
     add_labels,
     add_text,
-    choose_styles,
     compute_cell_edges,
     open_page,
 )
@@ -309,18 +308,6 @@ def draw_rose(
         end = _convert_to_points(np.array([weakest[0]]), np.array([weakest[1]]))[:, :1]
         main.plot(*np.insert(end, 0, 0.0, axis=1), color=ACCENT, linewidth=1.6, linestyle=(0, (4, 1.5)), label=label)
         add_labels(main, "towards west and east (g)", "towards south and north (g)")
-    return page.figure
-
-
-def draw_shares(*, azimuth: Floats, shares: Floats, labels: Sequence[str], **options: Unpack[FigureOptions]) -> Figure:
-    """Draw fractions, shape (curves, azimuths), against the azimuth; north is up, and the full circle is 1."""
-    with open_page((4.8, 4.8), **options) as page:
-        (axes,) = page.create_panels()
-        _set_plan_view(axes, 1.0)
-        for share, label, style in zip(shares, labels, choose_styles(len(labels)), strict=True):
-            line_style = {"linewidth": 1.4, "marker": "o", "markersize": 2.0, "label": escape_dollars(label), **style}
-            axes.plot(*_convert_to_points(azimuth, share), **line_style)
-        add_labels(axes, "share towards west and east", "share towards south and north")
     return page.figure
 
 

@@ -122,7 +122,7 @@ def group_components(
     See Also
     --------
     rocking.read : Read one channel as a motion.
-    rocking.response_rose : Simulate a body in all directions under pairs of components.
+    rocking.Motion.rotated : Combine two components along an azimuth.
 
     Examples
     --------
