@@ -222,7 +222,6 @@ FIGURES = {
     "survival": (survival_of, 3.6),
     "map": (map_of, 3.8),
     "rose": (rose_of, 4.0),
-    "shares": (shares_of, 4.6),
     "outcomes": (outcomes_of, 3.8),
     "orbit": (orbit_of, 3.8),
     "branch": (branch_of, 3.8),
