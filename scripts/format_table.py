@@ -33,7 +33,7 @@ def write_table() -> str:
 
 def _count_channels(form: Format) -> str:
     has_columns = any("(?P<columns" in pattern for pattern in form.statement_patterns)
-    return "several" if form.has_several or has_columns else "one"
+    return "several" if form.has_several_channels or has_columns else "one"
 
 
 def update_page(page: str) -> str:

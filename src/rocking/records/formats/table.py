@@ -31,7 +31,7 @@ from rocking.records.formats.channel import (
     fit_even_step,
     resolve_timing,
 )
-from rocking.records.formats.engine import (
+from rocking.records.formats.numbers import (
     NUMBER,
     StatedCount,
     compute_rounding,
@@ -276,7 +276,7 @@ def _read_wrapped(table: _TextTable, request: Request) -> list[Channel]:
     if request.dt is None:
         text += ", not one (acceleration) or two (time, acceleration); keep only these"
         raise source.error(f"{text}, {advice}, or give {{}} if they are one series", start, "dt")
-    values = read_values(source, start, len(source.data), None, StatedCount(0.0, start, max_surplus=math.inf))
+    values = read_values(source, start, len(source.data), (), StatedCount(0.0, start, max_surplus=math.inf))
     first = values[: -1 : table.column_count]
     if len(first) > 2 and find_first_fault(first) is None and fit_even_step(first) is not None:
         raise source.error(f"{text}, of which the first ones seem to be times; {advice}", start)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from decimal import Decimal
 from typing import Final, NamedTuple
 
@@ -24,14 +25,7 @@ _SPACE: Final = re.compile(rb"\s")
 _LINE_END: Final = re.compile(rb"\n")
 #: Largest number of characters of a number.
 _MAX_NUMBER_LENGTH: Final = 400
-_LAYOUT: Final = re.compile(r"(?ia)\(\s*(\d{1,3})\s*[EFGI]\s*(\d{1,3})(?:\.\d+)?\s*\)")
-
-
-def parse_layout(text: str) -> Layout | None:
-    """Return the Fortran columns stated by a header such as "... Format: (8f9.6)", or None."""
-    match = _LAYOUT.search(text)
-    layout = Layout(int(match[1]), int(match[2])) if match else None
-    return layout if layout and all(layout) else None
+_LAYOUT: Final = re.compile(r"(?ia)\(\s*(\d{1,3})\s*[EFGI]\s*(\d{1,3})(?:\.\d+)?\s*\)|^(\d{1,3})x(\d{1,3})$")
 
 
 def compute_rounding(text: str) -> float:
@@ -48,7 +42,6 @@ class StatedCount(NamedTuple):
 
     number: float
     offset: int  # offset of its line
-    stated_by: str = "the header"  # name for messages
     max_surplus: float = 0.0  # number of values that may fill the last row or the last second
 
     def allows(self, count: int) -> bool:
@@ -63,9 +56,11 @@ class Layout(NamedTuple):
     width: int  # characters per number
 
     @classmethod
-    def parse(cls, text: str) -> Layout | None:
-        """Return the layout written as 8x10, or None for an empty text."""
-        return cls(*map(int, text.split("x"))) if text else None
+    def find(cls, text: str) -> Layout | None:
+        """Return the layout in a text such as "8x10" or "... Format: (8f9.6)", or None."""
+        match = _LAYOUT.search(text)
+        sizes = [int(size) for size in match.groups() if size] if match else []
+        return cls(*sizes) if sizes and all(sizes) else None
 
     def split_line(self, line: bytes) -> list[bytes]:
         """Return the fields of a line, or the unchanged line if it does not fit."""
@@ -84,23 +79,23 @@ def find_numeric_end(source: Source, start: int) -> int:
     return len(data)
 
 
-def read_values(source: Source, start: int, end: int, layout: Layout | None, stated: StatedCount) -> Floats:
-    """Return all numbers between the offsets `start` and `end` of lines, as many as stated."""
-    values, values_end = _read_blocks(source, start, end, None)
-    columns_end = values_end
-    if layout is not None and not (values_end == end and stated.allows(len(values))):
-        column_values, columns_end = _read_blocks(source, start, end, layout)
-        if columns_end == end and (values_end < end or stated.allows(len(column_values))):
-            values, values_end = column_values, end
-    if values_end < end:
+def read_values(source: Source, start: int, end: int, layouts: Sequence[Layout], stated: StatedCount) -> Floats:
+    """Return all numbers between the offsets `start` and `end` of lines, as many as stated, between blanks or in columns."""
+    faults, counts = [], []
+    for layout in (None, *layouts):
+        values, values_end = _read_blocks(source, start, end, layout)
+        if values_end < end:
+            faults.append(_find_first_invalid(source, values_end, layout))
+        elif stated.allows(len(values)):
+            return values
+        else:
+            counts.append(len(values))
+    if not counts:
         # The reading that got further has the helpful error message.
-        tokens = _find_first_invalid(source, values_end, None), _find_first_invalid(source, columns_end, layout)
-        raise invalid_number_error(source, *max(tokens, key=lambda token: token[1]))
-    if not stated.allows(len(values)):
-        advice = "remove the other values" if len(values) > stated.number else "download the complete file again"
-        mismatch = f"{stated.stated_by} specifies {stated.number:.15g} values, but {len(values)} follow"
-        raise source.error(f"{mismatch}; {advice}, or correct that number", stated.offset)
-    return values
+        raise invalid_number_error(source, *max(faults, key=lambda fault: fault[1]))
+    advice = "remove the other values" if counts[-1] > stated.number else "download the complete file again"
+    mismatch = f"the header specifies {stated.number:.15g} values, but {counts[-1]} follow"
+    raise source.error(f"{mismatch}; {advice}, or correct that number", stated.offset)
 
 
 def invalid_number_error(source: Source, token: bytes, offset: int) -> RecordError:
