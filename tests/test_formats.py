@@ -28,6 +28,7 @@ from rocking.records import channels, formats, identify, read
 from rocking.records.formats import source, through_obspy
 from rocking.records.formats.channel import find_missing_value, fit_even_step
 from rocking.records.formats.source import Request
+from rocking.records.named import load_vertical
 
 GRAVITY = 9.80665
 SERIES = np.array(written.series(1)) / 100.0
@@ -363,11 +364,11 @@ def test_the_vertical_motion_is_a_channel_by_its_name_whatever_the_horizontal_on
     path, single = written.FOLDER / "two.v1", written.FOLDER / "nga.at2"
     for several in (False, True):
         for horizontal in (1, "90 Deg", None):
-            request = Request.create(None, None, horizontal, several=several)
-            assert formats.read_channel(path, request, vertical="Up").motion().pga == read(path, channel="Up").pga
+            request = Request.create(channel=horizontal, are_defaults=several)
+            assert load_vertical("Up", str(path), request).pga == read(path, channel="Up").pga
         for file in (path, single):
             with pytest.raises(RecordError, match="no channel, file or shipped record 'north'; give one of 1 '"):
-                formats.read_channel(file, Request.create(several=several), vertical="north")
+                load_vertical("north", str(file), Request.create(are_defaults=several))
 
 
 # PEER
@@ -459,7 +460,7 @@ def test_uneven_times_contradict_a_step(form: str, file: Callable[[str], Path]) 
     path = file(v1 if form == "CSMIP V1" else written.smc(pairs, rate=None))
     assert channels(path)[0].times is not None
     assert "the times are not evenly 0.02 s apart; omit dt" in complaint(path, dt=0.02)
-    request = source.Request.create(0.02, None, several=True)
+    request = source.Request.create(0.02, None, are_defaults=True)
     assert formats.read_channel(path, request).times is not None
 
 

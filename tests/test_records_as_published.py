@@ -16,6 +16,7 @@ from rocking.core.progress import notes_for
 from rocking.errors import MotionError, RecordError
 from rocking.records import channels, group_components, identify, read
 from rocking.records.formats import source
+from rocking.records.formats.source import Request
 from rocking.records.named import expand_record_names, load_motion
 
 GRAVITY = 9.80665
@@ -116,7 +117,7 @@ def test_an_archive_is_a_folder_of_its_records(station: Path) -> None:
     single = station / "one.zip"
     single.write_bytes(packed({"nga.at2": written.fixtures()["nga.at2"]}))
     assert read(single).pga == read(names[3]).pga
-    assert load_motion(names[3], vertical=names[2]).vertical is not None
+    assert load_motion(names[3], vertical_name=names[2]).vertical is not None
 
 
 def test_a_damaged_archive_is_refused_in_a_sentence(tmp_path: Path) -> None:
@@ -232,7 +233,7 @@ def test_the_offset_of_an_instrument_is_removed_by_default_and_noted(
     assert abs(np.polyfit(line.times, line.samples, 1)).max() < 1e-12
     assert filtered.history == ("baseline of degree 0 removed", "band-passed 2-inf Hz, order 4 forwards and backwards")
     with notes_for("everybody"):
-        load_motion(name, baseline="none")
+        load_motion(name, Request(baseline="none"))
         assert capsys.readouterr().err == ""
         load_motion(name)
     note = capsys.readouterr().err
@@ -269,7 +270,7 @@ def test_commands_and_studies_correct_records_as_read_does(
 def test_shipped_records_are_corrected_only_on_request() -> None:
     plain = records.load("el-centro-meloland-270")
     assert np.array_equal(load_motion("el-centro-meloland-270").samples, plain.samples)
-    assert load_motion("el-centro-meloland-270", highpass=0.05).history
+    assert load_motion("el-centro-meloland-270", Request(highpass=0.05)).history
 
 
 def test_uneven_samples_cannot_be_filtered() -> None:

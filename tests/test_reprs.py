@@ -64,8 +64,6 @@ RESULTS = {
     "rule": lambda path: rocking.rules.west([BLOCK, rocking.Block(half_width=0.2, half_height=1.0)], RECORD),
     "check": lambda path: rocking.rules.compare_rules(BLOCK, {"one": RECORD}, rules=["west"]),
     "channel": lambda path: records.channels(path)[0],
-    "contents": lambda path: records.contents(path),
-    "shipped": lambda path: records.shipped(),
     "format": lambda path: records.identify(path),
     "chattering": lambda path: rocking.chattering.chattering_report(1.03, 2.0, 0.92),
     "critical amplitude": lambda path: rocking.chattering.critical_report(2.0, 0.92),

@@ -10,7 +10,8 @@ import pytest
 from rocking.errors import RecordError
 from rocking.inputs.notes import list_reading_notes, list_vertical_notes
 from rocking.records.formats import channels, identify, read
-from rocking.records.named import load_motion, load_vertical
+from rocking.records.formats.source import Request
+from rocking.records.named import load_motion
 
 G = 9.80665
 FT, IN = 0.3048, 0.0254
@@ -268,11 +269,11 @@ def test_of_a_folder_those_that_say_something_else_keep_it_or_are_refused(tmp_pa
     for unit, what in (("cm/s", "'cm/s', which is not a unit of"), ("counts", "the units 'counts' are unknown")):
         path.write_text(f"t (s),v ({unit})\n" + rows())
         with pytest.raises(RecordError, match=what):
-            load_motion(str(path), units="g", several=True)
+            load_motion(str(path), Request.create(units="g", are_defaults=True))
     path.write_text("t (s),a (g)\n0,0\n0.01,1\n0.05,0.5\n0.06,0\n")
-    assert load_motion(str(path), dt=0.01, several=True).dt is None
+    assert load_motion(str(path), Request.create(0.01, are_defaults=True)).dt is None
     with pytest.raises(RecordError, match="not evenly"):
-        load_motion(str(path), dt=0.01)
+        load_motion(str(path), Request.create(0.01))
 
 
 def test_a_column_is_found_by_its_name_before_its_number(tmp_path):
@@ -286,12 +287,12 @@ def test_components_that_begin_apart_are_noted(tmp_path):
     path = tmp_path / "table.csv"
     both = [f"{0.01 * k:.2f},{k % 3},{0.01 * k + 0.2:.2f},{(k + 1) % 3}" for k in range(50)]
     path.write_text("t1 (s),a1 (g),t2 (s),a2 (g)\n" + "\n".join(both) + "\n")
-    found = load_motion(str(path), channel="a1").with_vertical(load_vertical("a2", str(path), channel="a1"))
+    found = load_motion(str(path), Request(channel="a1"), "a2")
     (note,) = (each for each in list_vertical_notes(found) if "begins" in each)
     assert "by its file the vertical motion begins 0.2 s after the horizontal one" in note
     assert not [each for each in list_vertical_notes(found.delayed(0.2)) if "begins" in each]
     path.write_text("t (s),a1 (g),a2 (g)\n" + "\n".join(f"{0.01 * k:.2f},{k % 3},{(k + 1) % 3}" for k in range(50)))
-    found = load_motion(str(path), channel="a1").with_vertical(load_vertical("a2", str(path), channel="a1"))
+    found = load_motion(str(path), Request(channel="a1"), "a2")
     assert list_vertical_notes(found) == ()
 
 

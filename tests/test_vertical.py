@@ -16,6 +16,7 @@ from rocking.errors import MotionError, OptionError
 from rocking.inputs.notes import list_vertical_notes
 from rocking.motion.description import Origin
 from rocking.motion.motion import compute_uplift_factors, find_exceedances
+from rocking.records.formats.source import Request
 from rocking.records.named import load_motion
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -156,23 +157,23 @@ def two_files(tmp_path: Path) -> dict[str, Path]:
 
 def test_what_is_said_of_files_is_for_the_one_of_two_that_does_not_say_its_own(two_files: dict[str, Path]) -> None:
     says, plain = str(two_files["says.csv"]), str(two_files["plain.txt"])
-    found = load_motion(says, vertical=plain, channel="ns", dt=0.02, units="m/s2")
+    found = load_motion(says, Request.create(0.02, "m/s2", channel="ns"), plain)
     alone = rocking.read(says, channel="ns")
     assert found.pga == alone.pga == pytest.approx(0.3, rel=1e-2)
     assert found.vertical is not None
     assert found.vertical.pga == pytest.approx(0.1, rel=1e-2)
-    shipped = load_motion("el-centro-meloland-270", vertical=plain, dt=0.02, units="m/s2")
+    shipped = load_motion("el-centro-meloland-270", Request.create(0.02, "m/s2"), plain)
     assert shipped.vertical is not None
     assert shipped.vertical.pga == found.vertical.pga
 
 
 def test_a_file_of_several_that_says_its_units_keeps_them_for_both_channels(two_files: dict[str, Path]) -> None:
     for name in ("says.csv", "silent.csv"):
-        found = load_motion(str(two_files[name]), channel="ns", vertical="up", units="g", several=True)
+        found = load_motion(str(two_files[name]), Request.create(units="g", channel="ns", are_defaults=True), "up")
         assert found.vertical is not None
         assert (found.pga, found.vertical.pga) == pytest.approx((0.3, 0.1), rel=1e-2)
     # Of one file alone a heading is overruled, and for both channels alike.
-    alone = load_motion(str(two_files["says.csv"]), channel="ns", vertical="up", units="g")
+    alone = load_motion(str(two_files["says.csv"]), Request.create(units="g", channel="ns"), "up")
     assert alone.vertical is not None
     assert alone.pga / alone.vertical.pga == pytest.approx(3.0, rel=2e-2)
     assert alone.pga == pytest.approx(30.0 * G, rel=1e-2)

@@ -23,6 +23,7 @@ from rocking.inputs.inventory import read_labelled, read_rows
 from rocking.inputs.pulses import FAMILIES, named_pulse
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
+from rocking.records.formats.source import Request
 from rocking.records.named import load_motion, load_vertical, path_exists
 
 _BOOLEANS: Final = {"1": True, "0": False, "true": True, "false": False, "yes": True, "no": False}
@@ -74,13 +75,11 @@ class _Table:
         return RecordError(message, *arguments, path=str(self.path), line=line, value=value)
 
 
-def read_calibration(
-    path: Path, *, channel: str | None, dt: float | None, units: str | None, **corrections: Any
-) -> list[ShakeTest] | MeasuredHistory:
+def read_calibration(path: Path, **options: Any) -> list[ShakeTest] | MeasuredHistory:
     """Read tests (see `read_tests`) or a history with columns `time_s` and `rotation_rad` or `rotation_deg`."""
     table = read_table(path)
     if {"motion", "overturned"} <= set(table.columns):
-        return _create_tests(table, channel=channel, dt=dt, units=units, **corrections)
+        return _create_tests(table, **options)
     if {"rotation_rad", "rotation_deg"} <= set(table.columns):
         raise table.create_error("the table must contain either rotation_rad or rotation_deg, not both")
     for column, unit in (("rotation_rad", 1.0), ("rotation_deg", np.pi / 180.0)):
@@ -126,32 +125,32 @@ def read_table(path: Path, convert_heading: Callable[[str], str] = str) -> _Tabl
     return _Table(path, tuple(columns), tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows))
 
 
-def _create_tests(table: _Table, **metadata: Any) -> list[ShakeTest]:
+def _create_tests(table: _Table, **options: Any) -> list[ShakeTest]:
     """Create the tests of a table with these columns."""
     specimens = dict.fromkeys(row.get("specimen") or "" for _, row in table.rows)
     if len(specimens) > 1:
         count = format_count(len(specimens), "specimen")
         raise table.create_error(f"the table contains tests of {count}; use one table for each")
-    overturned, motions = table.booleans("overturned"), _load_row_motions(table, **metadata)
+    overturned, motions = table.booleans("overturned"), _load_row_motions(table, **options)
     names, groups = ([row.get(column) or "" for _, row in table.rows] for column in ("name", "group"))
     return [ShakeTest(*row) for row in zip(motions, overturned, names, groups, strict=True)]
 
 
-def _load_row_motions(table: _Table, *, channel: Any, dt: Any, units: Any, **corrections: Any) -> tuple[Motion, ...]:
+def _load_row_motions(table: _Table, **options: Any) -> tuple[Motion, ...]:
     """Read each row's motion, scaled and with its vertical. The row's channel, dt_s and units take precedence."""
-    has_several = len({row["motion"] for _, row in table.rows}) > 1
+    has_several_motions = len({row["motion"] for _, row in table.rows}) > 1
     loaded: dict[tuple[object, ...], Motion] = {}
     motions = []
     for line, row in table.rows:
         scale = table.convert(line, row.get("scale") or "1", _parse_finite, "a number")
         step = table.convert(line, row["dt_s"], float, "a number") if row.get("dt_s") else None
-        cells = row.get("channel"), step, row.get("units")
-        options = {"channel": cells[0] or channel, "dt": dt if step is None else step, "units": cells[2] or units}
-        options |= corrections | {"several": has_several and not any(cells)}
+        cells = {"channel": row.get("channel"), "dt": step, "units": row.get("units")}
+        cells = {name: value for name, value in cells.items() if value}
         name, vertical = row["motion"], row.get("vertical") or ""
         try:
-            if (key := (name, vertical, *cells)) not in loaded:
-                loaded[key] = _load_row_motion(table.path, name, vertical, **options)
+            if (key := (name, vertical, *cells.items())) not in loaded:
+                request = Request.create(**options | cells, are_defaults=has_several_motions and not cells)
+                loaded[key] = _load_row_motion(table.path, name, vertical, request)
             motions.append(loaded[key] if scale == 1.0 else loaded[key].scaled(scale))
         except RockingError as error:
             record_file = str(error).removesuffix(str(error.message))  # file of the record, before the table
@@ -160,14 +159,14 @@ def _load_row_motions(table: _Table, *, channel: Any, dt: Any, units: Any, **cor
     return tuple(motions)
 
 
-def _load_row_motion(table: Path, name: str, vertical: str, *, several: bool, **metadata: Any) -> Motion:
+def _load_row_motion(table: Path, name: str, vertical: str, request: Request) -> Motion:
     """Read a record or pulse (in command syntax) with its optional vertical component."""
     record = _resolve_path(table, name)
     vertical_source = _resolve_path(table, vertical) if vertical else None
     if record != name or name.partition(":")[0] not in FAMILIES:
-        return load_motion(record, vertical=vertical_source, **metadata, several=several)
+        return load_motion(record, request, vertical_source)
     pulse = named_pulse(name)
-    return pulse if vertical_source is None else pulse.with_vertical(load_vertical(vertical_source, record, **metadata))
+    return pulse if vertical_source is None else pulse.with_vertical(load_vertical(vertical_source, record, request))
 
 
 def _resolve_path(table: Path, name: str) -> str:
@@ -233,8 +232,7 @@ def read_tests(
     table = read_table(checks.path(path, "path of a table", RecordError))
     if not {"motion", "overturned"} <= {*table.columns}:
         raise table.create_error(f"the columns must include motion and overturned; got {','.join(table.columns)}")
-    corrections = {"baseline": baseline, "highpass": highpass}
-    return _create_tests(table, channel=channel, dt=dt, units=units, **corrections)
+    return _create_tests(table, channel=channel, dt=dt, units=units, baseline=baseline, highpass=highpass)
 
 
 def read_observed(path: Path, measure: Measure, **options: Any) -> dict[str, Any]:

@@ -97,7 +97,7 @@ def calibrate(
             arguments[name] = HOUSNER if text == HOUSNER else read_bounds(text, name, reader)
     rotation = None if initial_rotation is None else read_tilt(initial_rotation, "initial_rotation")
     with output.folder() as folder:
-        table = read_calibration(data, **file.read_metadata(), **file.read_corrections())
+        table = read_calibration(data, **file.read_options())
         conflicting: dict[str, object] = {"motion": motion, "initial_rotation": initial_rotation}
         if isinstance(table, MeasuredHistory):
             conflicting = {
@@ -185,7 +185,7 @@ def validate(
         Seed of the simulations for bands and probabilities.
     """
     with output.folder() as folder:
-        rows = read_tests(tests, **file.read_metadata(), **file.read_corrections())
+        rows = read_tests(tests, **file.read_options())
         options: dict[str, Any] = {"outlier_probability": outlier_probability, "bin_count": bin_count, "seed": seed}
         validation = run_validation(rows, **block.create_block_arguments(model), **options)
         result = validation.to_dict()

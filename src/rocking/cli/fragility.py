@@ -104,7 +104,7 @@ def fragility(
     with output.folder() as folder:
         records: dict[str, Any] = {}
         if outcomes is not None:
-            observed = read_observed(outcomes, intensity_measure, **motion.read_metadata(), **motion.read_corrections())
+            observed = read_observed(outcomes, intensity_measure, **motion.read_options())
             fitted = fit_fragility(**observed, confidence=risk.confidence)
         else:
             check_measure(curve, intensity_measure)  # before the simulations

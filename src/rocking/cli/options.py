@@ -34,7 +34,8 @@ from rocking.inputs.quantities import (
 from rocking.inputs.texts import format_option_name
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import ComponentName, IntensityName, Measure
-from rocking.records.components import collect_pairs, name_components, note_skipped
+from rocking.records.components import collect_pairs, name_components, note_skipped, separate_verticals
+from rocking.records.formats.source import Request
 from rocking.records.named import (
     OWN,
     STANDARD_INPUT,
@@ -232,26 +233,24 @@ _FILE_OPTIONS: Final = {name: format_option_name(name) for name in ("channel", "
 class FileOptions(InputOptions):
     """Metadata that a record file lacks, and corrections of its numbers."""
 
-    def read_metadata(self) -> dict[str, Any]:
-        """Return channel, step and units as arguments."""
-        return dict.fromkeys(_FILE_OPTIONS) | self.read_values(*_FILE_OPTIONS)
+    def read_options(self) -> dict[str, Any]:
+        """Return channel, step, units, baseline and corner frequency as arguments, if they were supplied."""
+        return self.read_values(*_FILE_OPTIONS, "baseline", "highpass")
 
-    def read_corrections(self) -> dict[str, Any]:
-        """Return baseline and corner frequency as arguments."""
-        return self.read_values("baseline", "highpass")
+    def create_request(self, *, are_defaults: bool = False) -> Request:
+        """Return the options as a request, possibly as defaults for several files."""
+        return Request.create(**self.read_options(), are_defaults=are_defaults)
 
-    def read_motion(self, name: str, *, several: bool = False, is_pulse: bool = False) -> Motion:
+    def read_motion(self, name: str, *, are_defaults: bool = False, is_pulse: bool = False) -> Motion:
         """Return the scaled motion of a record or pulse, with notes."""
         vertical = self.supplied_texts().get("vertical")
         target = self._read_target()  # mistakes in the options are reported before a long file is read
         if is_pulse:
             motion = named_pulse(name)
             if vertical is not None:
-                options = self.read_metadata() | self.read_corrections()
-                motion = motion.with_vertical(load_vertical(vertical, name, **options))
+                motion = motion.with_vertical(load_vertical(vertical, name, self.create_request()))
         else:
-            options = self.read_metadata() | self.read_corrections()
-            motion = load_motion(name, **options, vertical=vertical, several=several)
+            motion = load_motion(name, self.create_request(are_defaults=are_defaults), vertical)
         return self._scale_motion(name, motion, target)
 
     def _read_target(self) -> tuple[float, Measure] | None:
@@ -365,11 +364,13 @@ class _RecordOptions(FileOptions):
         ):
             return self._load_pairs(records, [*pulses, *stochastic], has_channel_names=has_channel_names)
         pulse_motions = self.create_pulses()
-        read = functools.partial(self.read_motion, several=len(records) > 1)
+        read = functools.partial(self.read_motion, are_defaults=len(records) > 1)
         motions, skipped = read_records(records, read, keep_going=self.keep_going)
+        motions, reasons = separate_verticals(motions, names, keep_going=self.keep_going)
+        skipped |= {name: f"{name}: {reason}" for name, reason in reasons.items()}
         messages = [*skipped.values()]
         if records and not motions:
-            raise RecordError(f"none of {len(records)} records could be read; the first: {messages[0]}")
+            raise RecordError(f"none of {len(records)} records could be used; the first: {messages[0]}")
         for message in messages:
             note(f"skipped: {message}")
         motions |= pulse_motions | stochastic
@@ -385,13 +386,15 @@ class _RecordOptions(FileOptions):
         target = self._read_target()
         if target is not None and target[1].name != "factor":
             target = target[0], replace(target[1], component=self.component)
-        options = self.read_values("dt", "units") | self.read_corrections() | {"singles": is_own}
+        options = self.read_values("dt", "units", "baseline", "highpass") | {"with_singles": is_own}
         with_vertical = "vertical" in self.supplied_texts()
-        pairs, skipped = collect_pairs(records, vertical=with_vertical, keep_going=self.keep_going, **options)
-        note_skipped(skipped)
+        pairs, skipped = collect_pairs(records, with_vertical=with_vertical, keep_going=self.keep_going, **options)
         motion_names = name_components(pairs) if is_own else list_motion_names(pairs)
-        named = zip(motion_names, pairs, strict=True)
-        motions = {name: self._scale_motion(name, motion, target) for name, motion in named}
+        named = dict(zip(motion_names, pairs, strict=True))
+        horizontals, verticals = separate_verticals(named, keep_going=self.keep_going)
+        skipped |= verticals
+        note_skipped(skipped)
+        motions = {name: self._scale_motion(name, motion, target) for name, motion in horizontals.items()}
         motions |= {**self.create_pulses(), **self.create_stochastic_motions()} if others else {}
         return LoadedRecords(self._add_reversed(motions), skipped, False)
 

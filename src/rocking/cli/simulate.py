@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -34,19 +35,23 @@ from rocking.cli.output import (
     skip_on_error,
     write_results,
 )
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.progress import note
-from rocking.core.tables import format_table, list_some, to_json
+from rocking.core.tables import format_table, list_some, round_decimal, to_json
 from rocking.errors import OptionError, RecordError
 from rocking.inputs.notes import list_reading_notes
 from rocking.inputs.pulses import FAMILIES, PulseFamily
+from rocking.motion.motion import Motion
+from rocking.records import formats
+from rocking.records.catalogue import info, load
+from rocking.records.catalogue import names as list_shipped_names
+from rocking.records.formats.source import Request
 from rocking.records.named import (
     STANDARD_INPUT,
-    Contents,
-    contents,
     expand_record_names,
     is_shipped,
     reject_redundant_arguments,
-    shipped,
+    split_factor,
 )
 from rocking.response import Response
 from rocking.response.mechanics import check_available_friction
@@ -186,30 +191,58 @@ def records(
     For several files, those that cannot be read are listed with the reason, and the exit status is 2.
     """
     files = expand_record_names(names)
-    several = len(files) > 1
-    loaded, messages = read_records(files, lambda name: _read_contents(name, file, several=several), keep_going=several)
-    listings = [*loaded.values()] if files else [shipped()]
+    is_single = len(files) == 1
+    request = file.create_request(are_defaults=not is_single)
+    read = functools.partial(_list_record, request=request)
+    listings, messages = read_records(files, read, keep_going=not is_single) if files else ({"": _list_shipped()}, {})
     if output.as_json:
-        entries = [listing.to_dict() for listing in listings]
+        entries = [{**facts, "channels" if facts else "records": rows} for facts, rows in listings.values()]
         entries += [{"file": name, "error": message} for name, message in messages.items()]
         print(to_json(entries[0] if len(entries) == 1 else {"files": entries}))
     else:
-        print("\n\n".join([listing.summary() for listing in listings] + [*messages.values()]))
+        print("\n\n".join([_format_listing(*listing) for listing in listings.values()] + [*messages.values()]))
     if messages:
         raise RecordError(f"{len(messages)} of {len(files)} files cannot be read: {list_some([*messages])}")
 
 
-def _read_contents(name: str, file: FileOptions, *, several: bool) -> Contents:
+#: File, format and reason of its identification (empty for shipped records), and a row for each channel or record.
+_Listing = tuple[dict[str, Any], list[dict[str, Any]]]
+
+
+def _list_record(name: str, request: Request) -> _Listing:
     if is_shipped(name):
-        if not several:
-            reject_redundant_arguments(name, **file.read_metadata())
-        return shipped(name)
-    source = sys.stdin.buffer if name == STANDARD_INPUT else name
-    listing = contents(source, **file.read_metadata(), **file.read_corrections(), several=several)
-    for motion, entry in zip(listing.motions, listing.entries, strict=True):
+        reject_redundant_arguments(name, request)
+        return _list_shipped(name)
+    source, factor = split_factor(name)
+    identification, channels = formats.read_content(sys.stdin.buffer if name == STANDARD_INPUT else source, request)
+    rows = []
+    for channel in channels:
+        motion = channel.motion(request.baseline, request.highpass)
         for sentence in (*list_reading_notes(motion), *motion.history):
-            note(f"{name}, channel {entry['channel']}: {sentence}")
-    return listing
+            note(f"{name}, channel {channel.number}: {sentence}")
+        facts = {"channel": channel.number, "name": channel.name, "units": channel.units}
+        rows.append(facts | _tabulate_motion(motion.scaled(factor)))
+    return {"file": "standard input" if name == STANDARD_INPUT else name, **identification._asdict()}, rows
+
+
+def _list_shipped(*names: str) -> _Listing:
+    rows = []
+    for record in map(info, names or list_shipped_names()):
+        facts = {"name": record.name, "event": record.event, "station": record.station, "direction": record.direction}
+        rows.append(facts | _tabulate_motion(load(record.name)) | {"terms": record.terms})
+    return {}, rows
+
+
+def _tabulate_motion(motion: Motion) -> dict[str, Any]:
+    peak = round_decimal(motion.pga / STANDARD_GRAVITY)
+    return {"step_s": motion.dt, "duration_s": motion.duration, "pga_g": peak, "pgv_m_s": motion.pgv}
+
+
+def _format_listing(facts: dict[str, Any], rows: list[dict[str, Any]]) -> str:
+    # A missing value is the step of unevenly spaced samples.
+    cells = [["uneven" if value is None else value for value in row.values()] for row in rows]
+    title = "{file}: {format}, since {reason}\n\n".format(**facts) if facts else ""
+    return title + format_table([*rows[0]], cells)
 
 
 def pulses(*, output: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions()) -> None:

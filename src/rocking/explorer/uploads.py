@@ -9,7 +9,6 @@ import json
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any, Final, Generic, NamedTuple, TypeVar
 
@@ -219,7 +218,7 @@ def _describe_channel(channel: Channel, motion: Motion, *, is_complete: bool) ->
 
 
 def _create_request(dt: float | None = None, units: str | None = None, channel: str | None = None) -> Request:
-    return replace(Request.create(dt, units, channel), max_samples=_MAX_FILE_SAMPLES)
+    return Request.create(dt, units, channel=channel, max_samples=_MAX_FILE_SAMPLES)
 
 
 def _read_channel(upload: Upload, channel: Channel, *corrections: Any) -> Motion:

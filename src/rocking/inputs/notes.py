@@ -46,7 +46,6 @@ _MAX_DENSITY: Final = 23_000.0
 #: Largest plausible moment of a restraint per radian, divided by weight times R.
 _MAX_MOMENT: Final = 1e5
 
-_VERTICAL_CHANNEL: Final = re.compile(r"(up|down|dn|dwn|ver|vert|vertical|u-?d|z|v|[a-z]{2}z)\b.*", re.IGNORECASE)
 _HORIZONTAL_CHANNEL: Final = re.compile(
     r"(\d{2,3}|n|e|s|w|ns|ew|n-s|e-w|[ns] ?\d{1,2} ?[ew]|north|east|south|west|h[12]|[a-z]{2}[ne12])( deg.*)?",
     re.IGNORECASE,
@@ -72,15 +71,10 @@ def list_motion_notes(motion: Motion) -> tuple[str, ...]:
     ('the peak acceleration is 8.16 g, more than any ground motion has: are the units right?',)
     """
     notes = list_reading_notes(motion)
-    if is_vertical(motion):
+    if _find_origin(motion).is_vertical:
         direction = _find_origin(motion).channel
         notes += (f"the channel {direction!r} looks vertical, but it is taken for a horizontal motion",)
     return notes + list_vertical_notes(motion)
-
-
-def is_vertical(motion: Motion) -> bool:
-    """Return whether the name of a motion's channel is that of a vertical component."""
-    return _VERTICAL_CHANNEL.fullmatch(_find_origin(motion).channel) is not None
 
 
 def list_vertical_notes(motion: Motion) -> tuple[str, ...]:
@@ -92,7 +86,7 @@ def list_vertical_notes(motion: Motion) -> tuple[str, ...]:
         return ("the vertical motion is the horizontal one itself: name its own channel or file",)
     notes = [f"the vertical motion: {sentence}" for sentence in list_reading_notes(vertical)]
     direction = _find_origin(vertical).channel
-    if _HORIZONTAL_CHANNEL.fullmatch(direction) and not _VERTICAL_CHANNEL.fullmatch(direction):
+    if _HORIZONTAL_CHANNEL.fullmatch(direction) and not _find_origin(vertical).is_vertical:
         notes.append(f"the channel {direction!r} looks horizontal, but it is taken for the vertical motion")
     for attribute in ("station", "event"):
         upward, level = (getattr(_find_origin(c), attribute) for c in (vertical, motion))

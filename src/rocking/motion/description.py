@@ -12,6 +12,7 @@ from rocking.core import checks
 from rocking.errors import MotionError
 
 _DOWNWARD_CHANNEL: Final = re.compile(r"\s*(?:down|dwn|dn)\b", re.IGNORECASE)
+_VERTICAL_CHANNEL: Final = re.compile(r"-?(?:up|u|u-?d|v\d?|ver|vert\w*|z|down|dwn|dn|[a-z]{2}z)\b", re.IGNORECASE)
 _SCALED_TO_LEVEL: Final = re.compile(r"(scaled by \S+) to .*")
 
 
@@ -65,6 +66,11 @@ class Origin:
     def is_downward(self) -> bool:
         """Whether the motion is positive downwards, by the name of its channel."""
         return _DOWNWARD_CHANNEL.match(self.channel) is not None and not self.is_reversed
+
+    @property
+    def is_vertical(self) -> bool:
+        """Whether the component is vertical, by the name of its channel."""
+        return _VERTICAL_CHANNEL.match(self.channel) is not None
 
 
 @dataclass(frozen=True)

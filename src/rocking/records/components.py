@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 import os
-import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from rocking.core.progress import note
 from rocking.core.tables import format_count, format_reasons
@@ -19,9 +17,6 @@ from rocking.records import catalogue, formats
 from rocking.records.formats.channel import Channel
 from rocking.records.formats.source import Request
 from rocking.records.named import correct_motion, expand_record_names, is_shipped, make_names_unique, split_factor
-
-#: Names of vertical components.
-_VERTICAL: Final = re.compile(r"(?i)-?(?:up|u|ud|u-d|v\d?|vert\w*|z|down|dwn|dn|[BCDEHS][HLN]Z)(?:\W|$)")
 
 
 @dataclass(frozen=True, repr=False)
@@ -59,18 +54,19 @@ class Components:
         vertical = "" if self.vertical is None else " and the vertical one"
         return f"<Components: {self.station}, {self.event}: {len(self.horizontals)} horizontal{vertical}>"
 
-    def motions(self, *, vertical: bool = False) -> tuple[Motion, Motion]:
+    def motions(self, *, with_vertical: bool = False) -> tuple[Motion, Motion]:
         """Return both horizontal components, each with the other as orthogonal component.
 
-        With `vertical`, both have the vertical component. Raises `RecordError` if there are not two horizontal
+        With `with_vertical`, both have the vertical component. Raises `RecordError` if there are not two horizontal
         components or there is no vertical one.
         """
         first, second = self.pair
-        if vertical and self.vertical is None:
+        pair = first.with_orthogonal(second), second.with_orthogonal(first)
+        if not with_vertical:
+            return pair
+        if self.vertical is None:
             raise RecordError(f"{escape_braces(self.station)} has no vertical component")
-        upwards = self.vertical if vertical else None
-        pairs = first.with_orthogonal(second), second.with_orthogonal(first)
-        return pairs[0].with_vertical(upwards), pairs[1].with_vertical(upwards)
+        return pair[0].with_vertical(self.vertical), pair[1].with_vertical(self.vertical)
 
     @property
     def pair(self) -> tuple[Motion, Motion]:
@@ -129,20 +125,19 @@ def group_components(
     >>> [group.station for group in group_components("ridgecrest-*")]
     ['CI.CLC China Lake, G2 Tower Rd.', 'CI.TOW2 Tower 2']
     """
-    groups, reasons = _read_groups(names, dt, units, baseline, highpass, keep_going=keep_going)
+    request = Request.create(dt, units, baseline=baseline, highpass=highpass, are_defaults=True)
+    groups, reasons = _read_groups(names, request, keep_going=keep_going)
     note_skipped(reasons)
     return groups
 
 
-def _read_groups(
-    names: Any, dt: Any, units: Any, baseline: Any, highpass: Any, *, keep_going: bool
-) -> tuple[tuple[Components, ...], dict[str, str]]:
+def _read_groups(names: Any, request: Request, *, keep_going: bool) -> tuple[tuple[Components, ...], dict[str, str]]:
     """Return the components of `group_components`, and for each file that cannot be read the reason."""
     groups, reasons = dict[tuple[object, ...], list[Motion]](), dict[str, str]()
     single = [names] if isinstance(names, (str, os.PathLike)) else names
     for record in expand_record_names([os.fspath(name) for name in single]):
         try:
-            for place, motion in _read_components(record, Request.create(dt, units, several=True), baseline, highpass):
+            for place, motion in _read_components(record, request):
                 origin = motion.description.origin or Origin()
                 key = (origin.station or record, origin.event, origin.format, motion.dt, place, split_factor(record)[1])
                 groups.setdefault(key, []).append(motion)
@@ -157,22 +152,22 @@ def _read_groups(
     return tuple(created), reasons
 
 
-def _read_components(record: str, request: Request, baseline: Any, highpass: Any) -> Iterator[tuple[str, Motion]]:
+def _read_components(record: str, request: Request) -> Iterator[tuple[str, Motion]]:
     """Yield the motions of all channels of a record, with the place of the channel."""
     name, factor = split_factor(record)
     channels: Sequence[Channel | None] = [None] if is_shipped(name) else formats.read_content(name, request)[1]
     for channel in channels:
         if channel is None:
-            place, motion = "", correct_motion(record, catalogue.load(name), baseline, highpass)
+            place, motion = "", correct_motion(record, catalogue.load(name), request)
         else:
             place, label = channel.name.partition(" b")[2], f"{record}, channel {channel.label}"
             place += channel.metadata.get("location", "")
-            motion = correct_motion(label, channel.motion("none"), baseline, highpass, is_raw=channel.is_raw)
+            motion = correct_motion(label, channel.motion("none"), request, is_raw=channel.is_raw)
         yield place, motion if factor == 1.0 else motion.scaled(factor)
 
 
 def load_pairs(
-    names: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], *, vertical: bool = False, **options: Any
+    names: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], *, with_vertical: bool = False, **options: Any
 ) -> tuple[Motion, ...]:
     """Read the pairs of horizontal components of stations, for intensity measures of pairs.
 
@@ -180,7 +175,7 @@ def load_pairs(
     ----------
     names : str, path, or iterable of these
         As for `group_components`.
-    vertical : bool
+    with_vertical : bool
         Whether the motions have the vertical component of their station.
     **options : optional
         Options of `group_components`: dt, units, baseline, highpass and keep_going.
@@ -208,7 +203,7 @@ def load_pairs(
     >>> first.name, first.orthogonal.name
     ('ridgecrest-clc-090', 'ridgecrest-clc-360')
     """
-    motions, reasons = collect_pairs(names, vertical=vertical, **options)
+    motions, reasons = collect_pairs(names, with_vertical=with_vertical, **options)
     note_skipped(reasons)
     return motions
 
@@ -220,28 +215,55 @@ def note_skipped(reasons: Mapping[str, str]) -> None:
 
 
 def collect_pairs(
-    names: Any, *, vertical: bool, singles: bool = False, keep_going: bool = True, **options: Any
+    names: Any, *, with_vertical: bool, with_singles: bool = False, keep_going: bool = True, **options: Any
 ) -> tuple[tuple[Motion, ...], dict[str, str]]:
     """Return the motions of `load_pairs`, and the reason for each file and station without them.
 
-    With `singles`, stations without exactly two horizontal components are not pairs, and their components are separate.
+    With `with_singles`, components of stations without exactly two horizontal ones are separate motions, and so are
+    vertical ones unless `with_vertical`.
     """
-    values = [options.get(name) for name in ("dt", "units", "baseline", "highpass")]
-    groups, reasons = _read_groups(names, *values, keep_going=keep_going)
+    groups, reasons = _read_groups(names, Request.create(**options, are_defaults=True), keep_going=keep_going)
     motions = list[Motion]()
     for group in groups:
+        is_single = with_singles and len(group.horizontals) != 2
         try:
-            motions += (
-                group.horizontals if singles and len(group.horizontals) != 2 else group.motions(vertical=vertical)
-            )
+            motions += group.horizontals if is_single else group.motions(with_vertical=with_vertical)
         except (RecordError, MotionError) as error:
             reasons[group.station] = str(error).removeprefix(f"{group.station} ")
-        if singles and not vertical and group.vertical is not None:
-            reasons[f"{name_components([group.vertical])[0]}, vertical"] = "vertical components are not included"
+        if with_singles and not with_vertical and group.vertical is not None:
+            motions.append(group.vertical)
     if not motions:
-        reason = escape_braces(next(iter(reasons.values()), "there are no records"))
-        raise RecordError(f"no station has a pair of horizontal components: {reason}")
+        reason = ": ".join(next(iter(reasons.items()), ("there are no records",)))
+        raise RecordError(f"no station has a pair of horizontal components: {escape_braces(reason)}")
     return tuple(motions), reasons
+
+
+def separate_verticals(
+    motions: Mapping[str, Motion], exempt: Collection[str] = (), *, keep_going: bool
+) -> tuple[dict[str, Motion], dict[str, str]]:
+    """Return the motions without vertical ones, except exempt ones, and the reason for each vertical one by name.
+
+    Raises `RecordError` for one without a horizontal component of its station and event, unless `keep_going`.
+    """
+    origins = {name: motion.description.origin or Origin() for name, motion in motions.items()}
+    verticals = [name for name, origin in origins.items() if origin.is_vertical and name not in exempt]
+    stations = {(origin.station, origin.event) for name, origin in origins.items() if name not in verticals}
+    reasons = dict[str, str]()
+    for name in verticals:
+        has_horizontal = (origins[name].station, origins[name].event) in stations
+        error = _create_vertical_error(name, motions[name], has_horizontal=has_horizontal)
+        if not (has_horizontal or keep_going):
+            raise error
+        reasons[name] = str(error.message)
+    return {name: motion for name, motion in motions.items() if name not in verticals}, reasons
+
+
+def _create_vertical_error(name: str, motion: Motion, *, has_horizontal: bool) -> RecordError:
+    """Return the error for a vertical component among records that are used as horizontal motions."""
+    channel = escape_braces(repr((motion.description.origin or Origin()).channel))
+    text = f"this record is vertical (channel {channel}), and is not used as a horizontal motion"
+    advice = "" if has_horizontal else "; add a horizontal component of its station, with this record as {}"
+    return RecordError(text + advice, *[] if has_horizontal else ["vertical"], path=name)
 
 
 def name_components(motions: Sequence[Motion]) -> list[str]:
@@ -256,6 +278,7 @@ def name_components(motions: Sequence[Motion]) -> list[str]:
 
 
 def _create_components(station: str, event: str, motions: list[Motion]) -> Components:
-    are_vertical = [_VERTICAL.match((motion.description.origin or Origin()).channel) is not None for motion in motions]
-    horizontals = tuple(itertools.compress(motions, [not each for each in are_vertical]))
-    return Components(station, event, horizontals, next(itertools.compress(motions, are_vertical), None))
+    groups: dict[bool, list[Motion]] = {True: [], False: []}
+    for motion in motions:
+        groups[(motion.description.origin or Origin()).is_vertical].append(motion)
+    return Components(station, event, tuple(groups[False]), next(iter(groups[True]), None))

@@ -1,4 +1,4 @@
-"""Motions as arguments, by name or from record files, and lists of records and channels."""
+"""Motions as arguments, by name or from record files."""
 
 from __future__ import annotations
 
@@ -11,20 +11,19 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.progress import note
-from rocking.core.tables import add_unit, format_table, round_decimal
 from rocking.errors import MotionError, OptionError, RecordError
 from rocking.motion.motion import Motion
 from rocking.records import catalogue, formats
 from rocking.records.formats.channel import remove_baseline
-from rocking.records.formats.source import Request, list_archive, name_stream, split_archive
+from rocking.records.formats.source import Request, list_archive, split_archive
 
 #: One motion, several, or a mapping from names to motions.
 Motions = Motion | Mapping[str, Motion] | Sequence[Motion]
@@ -107,43 +106,31 @@ OWN = "own"
 #: Name of a record on standard input.
 STANDARD_INPUT = "-"
 
+_NO_REQUEST = Request()
 
-def load_motion(
-    name: str,
-    *,
-    vertical: str | None = None,
-    scale: float = 1.0,
-    several: bool = False,
-    baseline: int | str | None = None,
-    highpass: float | None = None,
-    **metadata: Any,
-) -> Motion:
-    """Return the scaled motion of a record file ("-" is standard input), or of a shipped record if no file exists.
 
-    Channel, dt, units, baseline and highpass are optional. With `several`, the first three apply to several files:
-    files that state step and units keep them, and the name of a single channel does not matter. A name may end with a
-    factor, as in "a.at2 x 1.5".
+def load_motion(name: str, request: Request = _NO_REQUEST, vertical_name: str | None = None) -> Motion:
+    """Return the motion of a record file ("-" is standard input), or of a shipped record if no file exists.
+
+    A name may end with a factor, as in "a.at2 x 1.5".
     """
-    several = several or (vertical is not None and _is_file_or_record(vertical))
+    if vertical_name is not None and _is_file_or_record(vertical_name):
+        request = replace(request, are_defaults=True)
     name, factor = split_factor(name)
     if is_shipped(name):
-        reject_redundant_arguments(name, **({} if several else metadata))
-        motion = correct_motion(name, catalogue.load(name), baseline, highpass)
+        reject_redundant_arguments(name, request)
+        motion = correct_motion(name, catalogue.load(name), request)
     else:
-        file = sys.stdin.buffer if name == STANDARD_INPUT else name
-        channel = formats.read_channel(file, Request.create(**metadata, several=several))
-        motion = correct_motion(name, channel.motion("none"), baseline, highpass, is_raw=channel.is_raw)
-    if vertical is not None:
-        options = {"baseline": baseline, "highpass": highpass, **metadata}
-        motion = motion.with_vertical(load_vertical(vertical, name, several=several, **options))
-    return motion if scale * factor == 1.0 else motion.scaled(scale * factor)
+        channel = formats.read_channel(sys.stdin.buffer if name == STANDARD_INPUT else name, request)
+        motion = correct_motion(name, channel.motion("none"), request, is_raw=channel.is_raw)
+    if vertical_name is not None:
+        motion = motion.with_vertical(load_vertical(vertical_name, name, request))
+    return motion if factor == 1.0 else motion.scaled(factor)
 
 
-def correct_motion(
-    name: str, original: Motion, baseline: int | str | None, highpass: float | None, *, is_raw: bool = False
-) -> Motion:
+def correct_motion(name: str, original: Motion, request: Request, *, is_raw: bool = False) -> Motion:
     """Return a motion without its baseline and high-pass filtered, with a note on the change of the peak."""
-    motion = remove_baseline(original, baseline, highpass, is_raw=is_raw)
+    motion = remove_baseline(original, request.baseline, request.highpass, is_raw=is_raw)
     if motion is not original:
         texts = [f"{each.pga:.4g} m/s^2 ({each.pga / STANDARD_GRAVITY:.4g} g)" for each in (original, motion)]
         note(f"{name}: {' and '.join(motion.history)}, which changes the peak acceleration from {' to '.join(texts)}")
@@ -156,17 +143,16 @@ def split_factor(name: str) -> tuple[str, float]:
     return (match[1], float(match[2])) if match else (name, 1.0)
 
 
-def load_vertical(name: str, record: str, *, several: bool = False, **options: Any) -> Motion:
+def load_vertical(name: str, record: str, request: Request) -> Motion:
     """Return a vertical motion by name: a file, a shipped record, or else a channel of the horizontal file."""
-    options = {key: value for key, value in options.items() if key != "channel"}  # the channel of the horizontal motion
     if _is_file_or_record(name):
-        return load_motion(name, several=True, **options)
-    corrections = [options.pop(key, None) for key in ("baseline", "highpass")]
+        return load_motion(name, replace(request, channel=None, are_defaults=True))
     if record == STANDARD_INPUT or not path_exists(record):
         text = f"there is no file or shipped record {name!r} for the vertical motion, and {record} has no channels"
         raise RecordError(f"{text}; check the name")
-    channel = formats.read_channel(record, Request.create(**options, several=several), vertical=name)
-    return channel.motion(*corrections)
+    channels = formats.read_content(record, replace(request, channel=None))[1]
+    found = formats.find_channel(record, channels, name, "channel, file or shipped record")
+    return found.motion(request.baseline, request.highpass)
 
 
 def _is_file_or_record(vertical: str) -> bool:
@@ -175,10 +161,11 @@ def _is_file_or_record(vertical: str) -> bool:
     return is_file or vertical in catalogue.names()
 
 
-def reject_redundant_arguments(name: str, **arguments: object) -> None:
+def reject_redundant_arguments(name: str, request: Request) -> None:
     """Raise an error if an argument specifies a property of a shipped record."""
-    text = "a shipped record has one channel, with known step and units; omit {}"
-    for argument in (key for key, value in arguments.items() if value is not None):
+    arguments = {"channel": request.channel, "dt": request.dt, "units": request.unit}
+    for argument in (key for key, value in arguments.items() if value is not None and not request.are_defaults):
+        text = "a shipped record has one channel, with known step and units; omit {}"
         raise RecordError(text, argument, path=name)
 
 
@@ -238,151 +225,3 @@ def _scale_files(name: str, line: int, row: list[str], file_columns: list[int], 
     for cell in (row[k].strip() for k in file_columns if len(row) > k and row[k].strip()):
         sibling = str(Path(name).parent / cell)
         yield f"{sibling if path_exists(sibling) else cell} x {text}"
-
-
-@dataclass(frozen=True)
-class Contents:
-    """List of records or channels.
-
-    Attributes
-    ----------
-    title : str
-        Title of the list, possibly empty.
-    facts : dict
-        Properties common to all entries.
-    kind : {"records", "channels"}
-        Kind of the entries.
-    entries : list of dict
-        Entries with the same names, including units, in the same order.
-    motions : tuple of Motion
-        Motions of a file's channels.
-
-    See Also
-    --------
-    rocking.records.contents : List the channels of a file.
-    rocking.records.shipped : List the shipped records.
-
-    Examples
-    --------
-    >>> import rocking
-    >>> contents = rocking.records.shipped("ridgecrest-clc-090")
-    >>> contents.kind, contents.entries[0]["step_s"]
-    ('records', 0.01)
-    """
-
-    title: str
-    facts: dict[str, Any]
-    kind: str
-    entries: list[dict[str, Any]]
-    motions: tuple[Motion, ...] = ()
-
-    def summary(self) -> str:
-        """Return the table as text, with its title."""
-        columns = list(self.entries[0])
-        # A missing value is the step of unevenly spaced samples.
-        rows = [["uneven" if value is None else value for value in entry.values()] for entry in self.entries]
-        return "\n\n".join(filter(None, (self.title, format_table(columns, rows))))
-
-    def __repr__(self) -> str:
-        names = ", ".join(str(entry["name"]) for entry in self.entries)
-        kind = self.kind if len(self.entries) > 1 else self.kind.removesuffix("s")
-        return f"<Contents: {'; '.join(filter(None, (self.title, f'{len(self.entries)} {kind}: {names}')))}>"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the facts, and the entries under their kind."""
-        return {**self.facts, self.kind: self.entries}
-
-
-def shipped(name: str | None = None) -> Contents:
-    """List the shipped records, or one of them.
-
-    Parameters
-    ----------
-    name : str, optional
-        Name of a single record.
-
-    Returns
-    -------
-    Contents
-        Table with step, duration and peaks.
-
-    See Also
-    --------
-    rocking.records.load : load a shipped record as a motion.
-
-    Examples
-    --------
-    >>> [entry["name"] for entry in shipped().entries][:2]
-    ['ridgecrest-clc-090', 'ridgecrest-clc-360']
-    """
-    entries = []
-    for record_name in catalogue.names() if name is None else [name]:
-        record = catalogue.info(record_name)
-        facts = {"name": record_name, "event": record.event, "station": record.station, "direction": record.direction}
-        entries.append(facts | _tabulate_motion(catalogue.load(record_name)) | {"terms": record.terms})
-    return Contents("", {}, "records", entries)
-
-
-def contents(
-    file: str | os.PathLike[str] | BinaryIO,
-    *,
-    channel: str | None = None,
-    dt: float | None = None,
-    units: str | None = None,
-    baseline: int | str | None = None,
-    highpass: float | None = None,
-    several: bool = False,
-) -> Contents:
-    """List the acceleration channels of a file, with its format.
-
-    Parameters
-    ----------
-    file : str, path or binary file
-        As for `rocking.read`.
-    channel, dt, units : str or float, optional
-        As for `rocking.read`. By default all channels are listed.
-    baseline, highpass : int, str or float, optional
-        As for `rocking.read`.
-    several : bool
-        Whether the arguments apply to several files. Files that state step and units then keep them.
-
-    Returns
-    -------
-    Contents
-        Table with units, step, duration and peaks of each channel.
-
-    See Also
-    --------
-    rocking.read : read a motion from a record file.
-    rocking.records.channels : return the channels with their samples.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> path = Path(tempfile.mkdtemp()) / "pulse.csv"
-    >>> _ = path.write_text("time (s), a (g)" + chr(10) + "0.0, 0.0" + chr(10) + "0.1, 0.5" + chr(10))
-    >>> [entry["pga_g"] for entry in contents(path).entries]
-    [0.5]
-    """
-    source, factor = split_factor(file) if isinstance(file, str) else (file, 1.0)
-    identification, channels = formats.read_content(source, Request.create(dt, units, channel, several=several))
-    motions = tuple(component.motion(baseline, highpass) for component in channels)
-    motions = motions if factor == 1.0 else tuple(motion.scaled(factor) for motion in motions)
-    name = name_stream(file) if hasattr(file, "read") else os.fsdecode(file)
-    facts = {"file": name, "format": identification.format, "reason": identification.reason}
-    title = f"{name}: {identification.format}, since {identification.reason}"
-    entries = [
-        {"channel": component.number, "name": component.name, "units": component.units} | _tabulate_motion(motion)
-        for component, motion in zip(channels, motions, strict=True)
-    ]
-    return Contents(title, facts, "channels", entries, motions)
-
-
-def _tabulate_motion(motion: Motion) -> dict[str, Any]:
-    return {
-        add_unit("step", "s"): motion.dt,
-        add_unit("duration", "s"): motion.duration,
-        add_unit("pga", "g"): round_decimal(motion.pga / STANDARD_GRAVITY),
-        add_unit("pgv", "m/s"): motion.pgv,
-    }

@@ -42,6 +42,8 @@ from rocking.inputs.pulses import find_family
 from rocking.inputs.toml import Tables
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
+from rocking.records.components import separate_verticals
+from rocking.records.formats.source import Request
 from rocking.records.named import OWN, expand_record_names, load_motion, path_exists
 from rocking.simulation.ensemble import ScalingLevels, SimulationProduct
 
@@ -294,7 +296,7 @@ def _load_motions(tables: Tables, scales: ScalingLevels) -> tuple[list[Motion], 
     for name in entries.get("records", []):
         with tables.locating_record_errors(name):
             names_by_path |= dict.fromkeys(_match_records(folder, name), name)
-    motions, names, skipped = list[Motion](), list[str](), list[str]()
+    motions, names, skipped, loaded = list[Motion](), list[str](), list[str](), dict[str, Motion]()
     if entries.get("pairs", False):
         motions += _load_pairs(tables, [*names_by_path])
         names += [motion.name for motion in motions]
@@ -302,16 +304,21 @@ def _load_motions(tables: Tables, scales: ScalingLevels) -> tuple[list[Motion], 
     for path, name in names_by_path.items():
         try:
             with tables.locating_record_errors(name):
-                motion = _load_record(tables, path, several=len(names_by_path) > 1)
-                scales.factors(motion)  # raises if the motion cannot be scaled
+                loaded[path] = _load_record(tables, path, are_defaults=len(names_by_path) > 1)
+                scales.factors(loaded[path])  # raises if the motion cannot be scaled
         except (RecordError, MotionError) as error:
             if not entries.get("skip_unreadable", False):
                 raise
             skipped.append(str(error))
-        else:
-            motions.append(motion)
-            is_sibling = path_exists(path) and Path(path).is_relative_to(folder)
-            names.append(str(Path(path).relative_to(folder)) if is_sibling else path)
+            loaded.pop(path, None)
+    exempt = [path for path, name in names_by_path.items() if path in (name, str(folder / name))]
+    with tables.locating_record_errors(""):
+        loaded, reasons = separate_verticals(loaded, exempt, keep_going=entries.get("skip_unreadable", False))
+    skipped += [f"{path}: {reason}" for path, reason in reasons.items()]
+    motions += loaded.values()
+    for path in loaded:
+        is_sibling = path_exists(path) and Path(path).is_relative_to(folder)
+        names.append(str(Path(path).relative_to(folder)) if is_sibling else path)
     for name, create in (("pulses", _create_pulses), ("stochastic", _create_stochastic_motions)):
         motions += itertools.chain(*(create(tables, k) for k in range(len(entries.get(name, [])))))
     if not motions:
@@ -332,18 +339,17 @@ def _load_pairs(tables: Tables, paths: list[str]) -> list[Motion]:
     options = {name: entries[name] for name in _READING_OPTIONS if name in entries}
     with tables.locating_record_errors(paths[0] if paths else ""):
         keep_going = entries.get("skip_unreadable", False)
-        return [*records.load_pairs(paths, vertical="vertical" in entries, keep_going=keep_going, **options)]
+        return [*records.load_pairs(paths, with_vertical="vertical" in entries, keep_going=keep_going, **options)]
 
 
-def _load_record(tables: Tables, path: str, *, several: bool) -> Motion:
+def _load_record(tables: Tables, path: str, *, are_defaults: bool) -> Motion:
     entries = tables.table("motions")
-    metadata = {name: entries[name] for name in _READING_OPTIONS if name in entries}
-    if "channel" in entries:
-        metadata["channel"] = str(entries["channel"])
-    if "vertical" in entries:  # a file beside the study file, or any other name
-        sibling = str(tables.file.parent / entries["vertical"])
-        metadata["vertical"] = sibling if path_exists(sibling) else entries["vertical"]
-    motion = load_motion(path, **metadata, several=several)
+    options = {name: entries[name] for name in _READING_OPTIONS if name in entries}
+    channel, vertical_name = (str(entries[name]) if name in entries else None for name in ("channel", "vertical"))
+    if vertical_name is not None:  # a file beside the study file, or any other name
+        sibling = str(tables.file.parent / vertical_name)
+        vertical_name = sibling if path_exists(sibling) else vertical_name
+    motion = load_motion(path, Request.create(**options, channel=channel, are_defaults=are_defaults), vertical_name)
     for sentence in list_motion_notes(motion):
         note(f"{path}: {sentence}")
     return motion

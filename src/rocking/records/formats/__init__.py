@@ -14,7 +14,7 @@ from rocking.motion.motion import Motion
 from rocking.records.formats import table, through_obspy
 from rocking.records.formats.channel import Channel, Identification, Recognised
 from rocking.records.formats.declared import load_formats
-from rocking.records.formats.source import Request, Source, open_source
+from rocking.records.formats.source import Request, Source, name_path, open_source
 
 __all__ = ["Channel", "Identification", "channels", "identify", "read"]
 
@@ -68,7 +68,7 @@ def read(
     See Also
     --------
     rocking.records.group_components : read all components, grouped by station and event.
-    rocking.records.contents : list the channels of a file.
+    rocking.records.channels : return all channels of a file.
     rocking.records.load : load a shipped record.
     rocking.Motion.processed : filter or trim a motion.
 
@@ -82,26 +82,26 @@ def read(
     >>> motion.duration, motion.pga
     (0.02, 4.903325)
     """
-    return read_channel(path, Request.create(dt, units, channel)).motion(baseline, highpass)
+    return read_channel(path, Request.create(dt, units, channel=channel)).motion(baseline, highpass)
 
 
-def read_channel(path: str | os.PathLike[str] | BinaryIO, request: Request, vertical: str | None = None) -> Channel:
-    """Return the channel of a record file for `read`, or the vertical channel by name."""
-    source = open_source(path)
-    found = _recognise_format(source).read(request)
-    if vertical is not None:
-        return _choose_channel(source, found, vertical, "channel, file or shipped record")
-    return _choose_channel(source, found, None if request.several and len(found) == 1 else request.channel)
+def read_channel(path: str | os.PathLike[str] | BinaryIO, request: Request) -> Channel:
+    """Return the requested channel of a record file, or the only one."""
+    _, found_channels = read_content(path, request)
+    if len(found_channels) > 1:
+        text = f"the file contains {len(found_channels)} channels; give {{}} as one of {_list_labels(found_channels)}"
+        raise RecordError(text, "channel", path=name_path(path))
+    return found_channels[0]
 
 
 def read_content(path: str | os.PathLike[str] | BinaryIO, request: Request) -> tuple[Identification, list[Channel]]:
-    """Return the format of a file, and its acceleration channels or the named one."""
+    """Return the format of a file, and its acceleration channels or the requested one."""
     source = open_source(path)
-    recognised = _recognise_format(source)
-    found_channels = recognised.read(request)
-    if request.channel is not None and not (request.several and len(found_channels) == 1):
-        found_channels = [_choose_channel(source, found_channels, request.channel)]
-    return Identification(recognised.format, recognised.reason), found_channels
+    identification, read_channels = _recognise_format(source)
+    found_channels = read_channels(request)
+    if request.channel is not None and not (request.are_defaults and len(found_channels) == 1):
+        found_channels = [find_channel(source.path, found_channels, request.channel)]
+    return identification, found_channels
 
 
 def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: str | None = None) -> tuple[Channel, ...]:
@@ -122,7 +122,7 @@ def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: st
     See Also
     --------
     rocking.read : read one channel as a motion.
-    rocking.records.contents : list the channels of a file.
+    rocking.records.identify : identify the format of a file.
 
     Examples
     --------
@@ -167,8 +167,7 @@ def identify(path: str | os.PathLike[str]) -> Identification:
     >>> identify(file)
     Identification(format='text table', reason='from line 2 on each line holds one number')
     """
-    recognised = _recognise_format(open_source(path))
-    return Identification(recognised.format, recognised.reason)
+    return _recognise_format(open_source(path))[0]
 
 
 def _recognise_format(source: Source) -> Recognised:
@@ -191,24 +190,22 @@ def _unknown_format_error(source: Source) -> RecordError:
     return source.error(f"{text}; {advice}")
 
 
-def _choose_channel(source: Source, channels: list[Channel], query: int | str | None, kind: str = "channel") -> Channel:
-    listing = list_some([channel.label for channel in channels], 30)
-    if query is None and len(channels) > 1:
-        raise source.error(
-            f"the file contains {len(channels)} channels; give {{}} as one of {listing}", None, "channel"
-        )
-    matching = channels if query is None else _match_channels(channels, query)
-    if not matching:
-        raise source.error(f"there is no {kind} {query!r}; give one of {listing}")
-    if len(matching) > 1:
-        raise source.error(f"{len(matching)} channels are called {query!r}; give another name or number of {listing}")
-    return matching[0]
-
-
-def _match_channels(channels: list[Channel], query: int | str) -> list[Channel]:
-    """Return the channels with that name, else number, else first word of the name."""
+def find_channel(path: str, channels: list[Channel], query: int | str, kind: str = "channel") -> Channel:
+    """Return the channel of a file with that name, else number, else first word of the name (a number first)."""
     text = str(query).casefold().split()
     by_number = [channel for channel in channels if [str(channel.number)] == text]
     by_name = [channel for channel in channels if channel.name.casefold().split() == text]
     by_word = [channel for channel in channels if channel.name.casefold().split()[:1] == text]
-    return by_name or by_number or by_word if isinstance(query, str) else by_number or by_name or by_word
+    matching = by_name or by_number or by_word if isinstance(query, str) else by_number or by_name or by_word
+    if not matching:
+        raise RecordError(f"there is no {kind} {query!r}; give one of {_list_labels(channels)}", path=path)
+    if len(matching) > 1:
+        message = (
+            f"{len(matching)} channels are called {query!r}; give another name or number of {_list_labels(channels)}"
+        )
+        raise RecordError(message, path=path)
+    return matching[0]
+
+
+def _list_labels(channels: list[Channel]) -> str:
+    return list_some([channel.label for channel in channels], 30)

@@ -94,7 +94,7 @@ def resolve_timing(
     step = fit_even_step(printed) if fault is None and len(printed) > 1 else None
     if step is not None:
         return request.check_step(source, step * unit.multiplier / unit.divisor, offset), None
-    requested = None if request.several else request.dt
+    requested = None if request.are_defaults else request.dt
     if requested is not None and has_rounded_step(printed, requested * unit.divisor / unit.multiplier):
         return requested, None
     if fault is not None:
@@ -116,7 +116,7 @@ class Identification(NamedTuple):
     See Also
     --------
     rocking.records.identify : Identify the format of a file.
-    rocking.records.contents : List the channels of a file.
+    rocking.records.channels : Return the channels of a file.
 
     Examples
     --------
@@ -131,12 +131,8 @@ class Identification(NamedTuple):
     reason: str
 
 
-class Recognised(NamedTuple):
-    """Recognised format, reason, and reader of the channels."""
-
-    format: str
-    reason: str
-    read: Callable[[Request], list[Channel]]
+#: Identified format, and reader of its channels.
+Recognised = tuple[Identification, Callable[[Request], "list[Channel]"]]
 
 
 @dataclass(frozen=True, eq=False)

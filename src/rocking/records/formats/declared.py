@@ -27,7 +27,14 @@ import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.errors import escape_braces
-from rocking.records.formats.channel import Channel, Recognised, create_channel, missing_value_error, resolve_timing
+from rocking.records.formats.channel import (
+    Channel,
+    Identification,
+    Recognised,
+    create_channel,
+    missing_value_error,
+    resolve_timing,
+)
 from rocking.records.formats.numbers import (
     NUMBER,
     Layout,
@@ -107,7 +114,7 @@ class Format:
             return None
         line = lines[text.count("\n", 0, mark.start())]
         reason = f"line {source.find_line_number(line.start)} reads {mark[0].splitlines()[0].strip()!r}"
-        return Recognised(self.name, reason, functools.partial(self._read_channels, source, lines[0].start))
+        return Identification(self.name, reason), functools.partial(self._read_channels, source, lines[0].start)
 
     def begins_channel(self, line: Line) -> bool:
         """Return whether a line begins a channel."""

@@ -80,7 +80,7 @@ def find_numeric_end(source: Source, start: int) -> int:
 
 
 def read_values(source: Source, start: int, end: int, layouts: Sequence[Layout], stated: StatedCount) -> Floats:
-    """Return all numbers between the offsets `start` and `end` of lines, as many as stated, between blanks or in columns."""
+    """Return the numbers between the offsets of two lines, separated by blanks or in columns, as many as stated."""
     faults, counts = [], []
     for layout in (None, *layouts):
         values, values_end = _read_blocks(source, start, end, layout)

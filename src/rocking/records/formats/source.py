@@ -17,7 +17,7 @@ import zipfile
 import zlib
 from dataclasses import dataclass
 from functools import cached_property
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 from rocking.core import checks
 from rocking.errors import MotionError, RecordError, describe_install, escape_braces
@@ -116,23 +116,21 @@ def unreadable_file_error(name: str, error: Exception) -> RecordError:
     return RecordError(text, path=name)
 
 
-def name_stream(stream: object) -> str:
-    """Return the name of a stream's file, or "standard input"."""
-    name = getattr(stream, "name", 0)
+def name_path(path: str | os.PathLike[str] | BinaryIO) -> str:
+    """Return the name of a file, or "standard input" for Python's standard streams."""
+    if isinstance(path, (str, bytes, os.PathLike)):
+        return os.fsdecode(path)
+    if not hasattr(path, "read"):
+        raise RecordError(f"the path of a record must be a file name, not {path!r}")
+    name = getattr(path, "name", 0)
     return "standard input" if isinstance(name, int) or name in ("<stdin>", "<fdopen>") else str(name)
 
 
 def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
     """Read a whole file, or the rest of an open one."""
-    read = getattr(path, "read", None)
-    if read is not None:  # Python's standard streams are named "<stdin>" or by a number
-        name = name_stream(path)
-    elif not isinstance(path, (str, bytes, os.PathLike)):
-        raise RecordError(f"the path of a record must be a file name, not {path!r}")
-    else:
-        name = os.fsdecode(path)
+    name = name_path(path)
     try:
-        name, raw = _unpack(name, _read_bytes(name) if read is None else read(SIZE_LIMIT + 1))
+        name, raw = _unpack(name, path.read(SIZE_LIMIT + 1) if hasattr(path, "read") else _read_bytes(name))
     except (OSError, ValueError, *_ARCHIVE_ERRORS) as error:
         raise unreadable_file_error(name, error) from error
     if len(raw) > SIZE_LIMIT:
@@ -266,21 +264,16 @@ class Request:
     dt: float | None = None  # sampling step, s
     unit: Unit | None = None  # unit of the numbers
     channel: int | str | None = None  # number or name
-    several: bool = False  # whether the arguments apply to several files
+    baseline: int | str | None = None  # degree of the polynomial to subtract, or "none"
+    highpass: float | None = None  # corner frequency of a high-pass filter, Hz
+    are_defaults: bool = False  # whether the arguments apply to several files
     max_samples: int | None = None  # limit of the samples unpacked from a compressed file
 
     @classmethod
-    def create(
-        cls,
-        dt: float | None = None,
-        units: str | None = None,
-        channel: int | str | None = None,
-        *,
-        several: bool = False,
-    ) -> Request:
-        """Create a request from checked arguments."""
+    def create(cls, dt: float | None = None, units: str | None = None, **options: Any) -> Request:
+        """Create a request from checked arguments, by the names of its fields."""
         step = None if dt is None else checks.positive(dt, "dt", MotionError, "s")
-        return cls(step, None if units is None else choose_unit(units), channel, several)
+        return cls(step, None if units is None else choose_unit(units), **options)
 
     def check_step(self, source: Source, stated: float, offset: int | None) -> float:
         """Return the step (s) that the file states at an offset, or raise an error."""
@@ -289,7 +282,7 @@ class Request:
             raise source.error(
                 f"the sampling step must be positive; got {stated:g} s; correct it", offset, value=stated
             )
-        if self.dt is not None and not self.several and not math.isclose(self.dt, stated, rel_tol=1e-6):
+        if self.dt is not None and not self.are_defaults and not math.isclose(self.dt, stated, rel_tol=1e-6):
             text = f"the sampling step in the file is {stated:g} s, not {{}} {self.dt:g} s; omit {{}}"
             raise source.error(text, offset, "dt", "dt", value=self.dt)
         return stated
@@ -298,12 +291,12 @@ class Request:
         """Return the unit that the file states at an offset, or else the requested one."""
         spelling = stated.strip() if isinstance(stated, str) else ""
         unit = find_unit(spelling) if isinstance(stated, str) else stated
-        unit = unit or (None if spelling and self.several else self.unit)
+        unit = unit or (None if spelling and self.are_defaults else self.unit)
         if unit is None:
             unknown = f"the units {escape_braces(repr(spelling))} are unknown"
             fault = unknown if spelling else "the file does not state its units"
             raise source.error(f"{fault}; give {{}} as one of {', '.join(UNIT_NAMES)}", offset, "units")
-        if self.unit is not None and not self.several and unit != self.unit:
+        if self.unit is not None and not self.are_defaults and unit != self.unit:
             text = f"the units in the file are {unit.name}, not {{}} {self.unit.name!r}; omit {{}}"
             raise source.error(text, offset, "units", "units", value=self.unit.name)
         return unit

@@ -25,12 +25,14 @@ from rocking.core.arrays import Floats
 from rocking.errors import RecordError, escape_braces
 from rocking.records.formats.channel import (
     Channel,
+    Identification,
     Recognised,
     create_channel,
     find_first_fault,
     fit_even_step,
     resolve_timing,
 )
+from rocking.records.formats.heading import RULE, Heading, parse_heading
 from rocking.records.formats.numbers import (
     NUMBER,
     StatedCount,
@@ -40,7 +42,6 @@ from rocking.records.formats.numbers import (
     parse_token,
     read_values,
 )
-from rocking.records.formats.heading import RULE, Heading, parse_heading
 from rocking.records.formats.source import Line, Request, Source
 
 _DELIMITERS: Final = {",": "a comma", ";": "a semicolon", " ": "a blank"}
@@ -135,7 +136,7 @@ class _TextTable(NamedTuple):
         if not times:
             self._check_step(request.dt)
         self._check_row_numbers(numbers)
-        is_overruled = request.unit is not None and not request.several
+        is_overruled = request.unit is not None and not request.are_defaults
         channels = []
         for number, column in enumerate(chosen, 1):
             _, name, unit, unknown_unit = self.heading.columns[column]
@@ -254,7 +255,7 @@ def recognise_table(source: Source) -> Recognised | None:
     numbers_text = f"{table.column_count} numbers, between them {_DELIMITERS[table.delimiter]}"
     row_text = "one number" if table.column_count == 1 else numbers_text
     reason = f"from line {source.find_line_number(table.start)} on each line holds {row_text}"
-    return Recognised("text table", reason, table.read)
+    return Identification("text table", reason), table.read
 
 
 def recognise_wrapped(source: Source) -> Recognised | None:
@@ -263,7 +264,7 @@ def recognise_wrapped(source: Source) -> Recognised | None:
     if table is None:
         return None
     reason = f"from line {source.find_line_number(table.start)} on each line holds {table.column_count} numbers"
-    return Recognised("wrapped numbers", reason, functools.partial(_read_wrapped, table))
+    return Identification("wrapped numbers", reason), functools.partial(_read_wrapped, table)
 
 
 def _read_wrapped(table: _TextTable, request: Request) -> list[Channel]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rocking.records.formats.channel import Channel, Recognised, create_channel
+from rocking.records.formats.channel import Channel, Identification, Recognised, create_channel
 from rocking.records.formats.source import Request, Source
 from rocking.records.units import Unit
 
@@ -39,7 +39,7 @@ def recognise_with_obspy(source: Source) -> Recognised | None:
         return None
     name = next(readable, claims[0])
     reason = f"ObsPy's {name} reader recognises it"
-    return Recognised(f"{name} (through ObsPy)", reason, functools.partial(_read_channels, source, name))
+    return Identification(f"{name} (through ObsPy)", reason), functools.partial(_read_channels, source, name)
 
 
 def _read_channels(source: Source, name: str, request: Request) -> list[Channel]:
