@@ -13,9 +13,10 @@ FIRST, LAST = "<!-- formats: written by scripts/format_table.py -->\n", "<!-- en
 def write_table() -> str:
     """Return the table of the declared formats, and of those that are found otherwise."""
     units = "from the heading, or `units=`"
-    rows = [
-        (form.agency, f"`{form.name}`", form.recognised, _count_channels(form), form.units) for form in load_formats()
-    ]
+    rows = []
+    for form in load_formats():
+        agency, recognised, form_units = (form.documentation[name] for name in ("agency", "recognised", "units"))
+        rows.append((agency, f"`{form.name}`", recognised, _count_channels(form), form_units))
     rows += [
         ("Text, CSV and XLSX", "`text table`", "rows of numbers", "those in the heading", units),
         (

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-DATA = Path(__file__).resolve().parents[1] / "src" / "rocking" / "motion" / "data"
+DATA = Path(__file__).resolve().parents[1] / "src" / "rocking" / "records" / "data"
 
 RIDGECREST = "Ridgecrest, California, M 7.1, 2019-07-06"
 IMPERIAL_VALLEY = "Imperial Valley, California, 1979-10-15"
@@ -36,6 +36,7 @@ class Station(NamedTuple):
 
     record: str
     files: tuple[str, ...]
+    title: str
     event: str
     station: str
     state: str
@@ -47,6 +48,7 @@ STATIONS = (
     Station(
         record="ridgecrest-clc",
         files=("CICLC.v1",),
+        title="Ridgecrest 2019, China Lake",
         event=RIDGECREST,
         station="CI.CLC China Lake, G2 Tower Rd.",
         state="uncorrected (CSMIP V1)",
@@ -56,6 +58,7 @@ STATIONS = (
     Station(
         record="ridgecrest-tow2",
         files=("CITOW2.RAW",),
+        title="Ridgecrest 2019, Tower 2",
         event=RIDGECREST,
         station="CI.TOW2 Tower 2",
         state="uncorrected (CSMIP V1)",
@@ -65,6 +68,7 @@ STATIONS = (
     Station(
         record="el-centro-meloland",
         files=("MELOLAND_CHAN15.V2", "MELOLAND_CHAN24.V2", "MELOLAND_CHAN14.V2"),
+        title="Imperial Valley 1979, El Centro Meloland overpass",
         event=IMPERIAL_VALLEY,
         station="1336 El Centro, Highway 8 / Meloland overpass, free field",
         state="corrected (CSMIP V2), band-passed with ramps at 0.07-0.17 and 23-25 Hz",
@@ -118,6 +122,7 @@ def entry(station: Station, channel: Channel) -> dict[str, object]:
     """Return what the catalogue says of one record."""
     return {
         "archive": f"{station.record}.npz",
+        "title": f"{station.title}, {channel.direction}",
         "event": station.event,
         "station": station.station,
         "direction": channel.direction,

@@ -246,7 +246,7 @@ def test_the_figure_names_every_mode_that_it_shows():
         ({"pulse": "sine"}, "cycles"),
         ({"pulse": "half-sine", "cycles": 2.0}, "cycles"),
         ({"pulse": rocking.pulses.half_sine, "cycles": 2.0}, "set them in it"),
-        ({"pulse": lambda a, f: a * f}, "a Motion is required, not a float"),
+        ({"pulse": lambda a, f: a * f}, "a Motion is required, not 0."),
         ({"pulse": lambda a, f: None}, "is None; return a Motion"),
         ({"pulse": lambda a, f: rocking.pulses.half_sine(a, 1.0), "frequencies": [1.0, 3.0]}, "the same shape"),
         ({"pulse": lambda a, f: rocking.pulses.n_lobe([a, a * a], f)}, "the same shape"),

@@ -136,7 +136,6 @@ REFUSED = [
     ("velocities", "Time (s),v (cm/s)\n" + rows(), 1, "the heading states 'cm/s', which is not a unit of"),
     ("displacements", "time (s),disp (cm)\n" + rows(), 1, "of acceleration; use a table of accelerations"),
     ("a unit in Spanish", "t (s),a (cm/seg2)\n" + rows(), 1, "the units 'cm/seg2' are unknown; give units as one"),
-    ("a gap in the numbers of rows", "No,t (s),a (g)\n1,0,1\n2,1,2\n4,2,1\n5,3,2\n", 4, "use a record without gaps"),
     ("a factor", "Time (s),a (10^-3 g)\n" + rows(), 1, "the units '10^-3 g' are unknown"),
     ("two units", "Time (s),a (g or cm/s2)\n" + rows(), 1, "the units 'g or cm/s2' are unknown"),
     ("numbers of rows and no times", "Sample,a (g)\n" + wide(COUNT, SAMPLES), 2, "give dt in seconds"),
@@ -210,16 +209,6 @@ def test_even_and_uneven_times_are_in_the_unit_of_their_heading(tmp_path: Path) 
     assert read(path, dt=0.005).dt == 0.005
     with pytest.raises(RecordError, match=r"the sampling step in the file is 0\.005 s, not dt 5 s"):
         read(path, dt=5.0)
-
-
-@pytest.mark.parametrize(
-    "name", ["time (s)", "Time", "t/ms", "Time in s", "# Zeit, s", "time\n(s)", "t [s]", "Period (s)", "PSA (g)"]
-)
-def test_a_column_of_times_alone_is_not_read_as_accelerations(tmp_path, name):
-    path = tmp_path / "times.csv"
-    path.write_text(f"{name}\n0.000\n0.005\n0.010\n")
-    with pytest.raises(RecordError, match=r"names no column of accelerations"):
-        read(path, dt=0.005, units="g")
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ from rocking.core.result import Result
 from rocking.core.tables import Column, escape_dollars, format_count, format_table
 from rocking.errors import OptionError
 from rocking.motion.motion import Motion
-from rocking.records.named import Motions, find_distinct_motions, list_motions
+from rocking.records.named import Motions, list_motions
 from rocking.simulation.ensemble import simulate_many
 
 if TYPE_CHECKING:
@@ -471,3 +471,15 @@ def check_outcomes(overturned: ArrayLike, count: int) -> Flags:
         raise OptionError(f"all outcomes are equal; {requirement}")
     observed.flags.writeable = False
     return observed
+
+
+def find_distinct_motions(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
+    """Return distinct motions, and the index of each motion among them."""
+    distinct: dict[tuple[bytes, ...], Motion] = {}
+    keys = []
+    for motion in motions:
+        parts = [part for part in (motion, motion.vertical) if part is not None]
+        keys.append(tuple(values.tobytes() for part in parts for values in (part.breakpoints, part.coefficients)))
+        distinct.setdefault(keys[-1], motion)
+    indices = {key: index for index, key in enumerate(distinct)}
+    return [*distinct.values()], [indices[key] for key in keys]

@@ -13,7 +13,13 @@ from numpy.typing import ArrayLike
 from rocking.analysis.levels import assign_numbers, describe_pool, normalise_weights
 from rocking.block.body import Bodies, Body
 from rocking.calibration.diagnostics import Scores, compute_log_losses
-from rocking.calibration.outcomes import Calibration, Validation, compute_probabilities, simulate_outcomes
+from rocking.calibration.outcomes import (
+    Calibration,
+    Validation,
+    compute_probabilities,
+    find_distinct_motions,
+    simulate_outcomes,
+)
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import Model
@@ -22,7 +28,7 @@ from rocking.core.tables import Column, escape_dollars, format_count, format_tab
 from rocking.engine.problem import compute_slenderness, gather_bodies
 from rocking.errors import MotionError, OptionError
 from rocking.motion.motion import Motion
-from rocking.records.named import check_motion, find_distinct_motions, make_names_unique
+from rocking.records.named import check_motion, make_names_unique
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,6 @@ near-fault pulse. The values are exactly those published.
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import dataclass
 from importlib import resources
 from typing import Any, Final
@@ -33,6 +32,8 @@ class ShippedRecord:
     ----------
     name : str
         Name for `load`.
+    title : str
+        Place and year of the event, station and direction.
     event, station : str
         Earthquake and place.
     direction : str
@@ -60,6 +61,7 @@ class ShippedRecord:
 
     name: str
     archive: str
+    title: str
     event: str
     station: str
     direction: str
@@ -70,15 +72,6 @@ class ShippedRecord:
     denominator: int
     source: str
     terms: str
-
-    @property
-    def title(self) -> str:
-        """Short title: place and year of the event, station and direction."""
-        year = re.search(r"(?:19|20)\d{2}", self.event)
-        place, *details = re.sub(r"^(?:[A-Z]{2}\.\w+|\d+) ", "", self.station).split(", ")
-        crossing = [part.partition(" / ")[2] for part in details if " / " in part]
-        event = self.event.partition(",")[0] + (f" {year[0]}" if year else "")
-        return f"{event}, {' '.join([place, *crossing])}, {self.direction}"
 
 
 def names() -> tuple[str, ...]:
@@ -175,14 +168,9 @@ def load(name: str) -> Motion:
     published = np.cumsum(np.cumsum(read_differences(record))) / record.denominator
     facts = (record.event, record.station, f"direction {record.direction}", record.state, record.source)
     text = f"{'; '.join(facts)}; terms: {record.terms}"
-    origin_fields: dict[str, Any] = {
-        "event": record.event,
-        "station": record.station,
-        "units": record.units,
-        "channel": record.direction,
-    }
     azimuth = float(record.direction) if record.direction.isdecimal() else None
-    description = Description("record", text=text, origin=Origin(azimuth=azimuth, **origin_fields))
+    origin = Origin("", "", record.event, record.station, record.direction, azimuth=azimuth, units=record.units)
+    description = Description("record", text=text, origin=origin)
     samples = choose_unit(record.units).to_si(published)
     return Motion.from_samples(samples, record.dt, name=name, description=description)
 

@@ -61,12 +61,11 @@ class Components:
         components or there is no vertical one.
         """
         first, second = self.pair
-        pair = first.with_orthogonal(second), second.with_orthogonal(first)
-        if not with_vertical:
-            return pair
-        if self.vertical is None:
+        if with_vertical and self.vertical is None:
             raise RecordError(f"{escape_braces(self.station)} has no vertical component")
-        return pair[0].with_vertical(self.vertical), pair[1].with_vertical(self.vertical)
+        vertical = self.vertical if with_vertical else None
+        first, second = first.with_orthogonal(second), second.with_orthogonal(first)
+        return first.with_vertical(vertical), second.with_vertical(vertical)
 
     @property
     def pair(self) -> tuple[Motion, Motion]:
@@ -148,7 +147,11 @@ def _read_groups(names: Any, request: Request, *, keep_going: bool) -> tuple[tup
     if not groups:
         first = ": ".join(next(iter(reasons.items()), ()))
         raise RecordError(f"no record could be read; the first: {escape_braces(first)}")
-    created = (_create_components(str(key[0]), str(key[1]), motions) for key, motions in groups.items())
+    created = []
+    for (station, event, *_), motions in groups.items():
+        verticals = [motion for motion in motions if (motion.description.origin or Origin()).is_vertical]
+        horizontals = tuple(motion for motion in motions if motion not in verticals)
+        created.append(Components(str(station), str(event), horizontals, next(iter(verticals), None)))
     return tuple(created), reasons
 
 
@@ -248,22 +251,12 @@ def separate_verticals(
     origins = {name: motion.description.origin or Origin() for name, motion in motions.items()}
     verticals = [name for name, origin in origins.items() if origin.is_vertical and name not in exempt]
     stations = {(origin.station, origin.event) for name, origin in origins.items() if name not in verticals}
-    reasons = dict[str, str]()
+    reasons = {name: f"this record is vertical (channel {origins[name].channel!r})" for name in verticals}
     for name in verticals:
-        has_horizontal = (origins[name].station, origins[name].event) in stations
-        error = _create_vertical_error(name, motions[name], has_horizontal=has_horizontal)
-        if not (has_horizontal or keep_going):
-            raise error
-        reasons[name] = str(error.message)
+        if not keep_going and (origins[name].station, origins[name].event) not in stations:
+            advice = "add a horizontal record of its station, for which this one can be {}"
+            raise RecordError(f"{escape_braces(reasons[name])}; {advice}", "vertical", path=name)
     return {name: motion for name, motion in motions.items() if name not in verticals}, reasons
-
-
-def _create_vertical_error(name: str, motion: Motion, *, has_horizontal: bool) -> RecordError:
-    """Return the error for a vertical component among records that are used as horizontal motions."""
-    channel = escape_braces(repr((motion.description.origin or Origin()).channel))
-    text = f"this record is vertical (channel {channel}), and is not used as a horizontal motion"
-    advice = "" if has_horizontal else "; add a horizontal component of its station, with this record as {}"
-    return RecordError(text + advice, *[] if has_horizontal else ["vertical"], path=name)
 
 
 def name_components(motions: Sequence[Motion]) -> list[str]:
@@ -275,10 +268,3 @@ def name_components(motions: Sequence[Motion]) -> list[str]:
         for origin, motion in zip(origins, motions, strict=True)
     ]
     return make_names_unique(names)
-
-
-def _create_components(station: str, event: str, motions: list[Motion]) -> Components:
-    groups: dict[bool, list[Motion]] = {True: [], False: []}
-    for motion in motions:
-        groups[(motion.description.origin or Origin()).is_vertical].append(motion)
-    return Components(station, event, tuple(groups[False]), next(iter(groups[True]), None))

@@ -13,10 +13,11 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
+from rocking.core import checks
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.progress import note
 from rocking.errors import MotionError, OptionError, RecordError
@@ -41,9 +42,8 @@ def list_motions(motions: Motions) -> list[Motion]:
     if isinstance(motions, Mapping):
         unnamed = list_motions([*motions.values()])
         return [replace(motion, name=name) for name, motion in zip(motions, unnamed, strict=True)]
-    gathered: list[Any] = [motions]
-    if isinstance(motions, Iterable) and not isinstance(motions, (Motion, str, Path, np.ndarray)):
-        gathered = list(motions)
+    is_iterable = isinstance(motions, Iterable) and not isinstance(motions, (Motion, str, Path, np.ndarray))
+    gathered: list[Any] = list(cast(Any, motions)) if is_iterable else [motions]
     if not gathered:
         raise OptionError("{} must contain at least one motion", "motions")
     for motion in gathered:
@@ -55,8 +55,6 @@ def list_motions(motions: Motions) -> list[Motion]:
 def index_motions(motions: Motions) -> dict[str, Motion]:
     """Return motions by the names of a mapping, or else by their own."""
     motion_list = list_motions(motions)
-    if isinstance(motions, Mapping):
-        return dict(motions)
     return dict(zip(list_motion_names(motion_list), motion_list, strict=True))
 
 
@@ -77,24 +75,9 @@ def make_names_unique(names: Sequence[str]) -> list[str]:
     return unique
 
 
-def find_distinct_motions(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
-    """Return distinct motions, and the index of each motion among them."""
-    distinct: dict[tuple[bytes, ...], Motion] = {}
-    keys = []
-    for motion in motions:
-        parts = [part for part in (motion, motion.vertical) if part is not None]
-        keys.append(tuple(values.tobytes() for part in parts for values in (part.breakpoints, part.coefficients)))
-        distinct.setdefault(keys[-1], motion)
-    indices = {key: index for index, key in enumerate(distinct)}
-    return [*distinct.values()], [indices[key] for key in keys]
-
-
 def _describe_wrong_type(value: Any) -> str:
-    if isinstance(value, (str, Path)):
-        loader = "rocking.records.load" if str(value) in catalogue.names() else "rocking.read"
-        return f'a Motion is required, not {str(value)!r}; load it with {loader}("{value}")'
-    type_name = "None" if value is None else f"a {type(value).__name__}"
-    return f"a Motion is required, not {type_name}; create one with Motion.from_samples(array, dt), in m/s^2 and s"
+    advice = "load one with rocking.read(file) or rocking.records.load(name), or create one with Motion.from_samples"
+    return f"a Motion is required, not {checks.short_repr(value)}; {advice}"
 
 
 #: Name of a record with a factor.

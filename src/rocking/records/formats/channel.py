@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import MotionError, RecordError
 from rocking.motion.description import Description, Origin
 from rocking.motion.motion import Motion
@@ -81,15 +80,13 @@ def _find_simplest_step(times: Floats, step: float, drift: float, max_spread: fl
 
 
 def resolve_timing(
-    source: Source,
-    request: Request,
-    printed: Floats,
-    unit: Unit,
-    offset: int,
-    find_row: Callable[[int], int] | None = None,
+    source: Source, request: Request, printed: Floats, unit: Unit, find_row: Callable[[int], int]
 ) -> tuple[float | None, Floats | None]:
-    """Return the step (s) of times in a unit, or else the times (s), checked against the requested step."""
-    times, find_row = unit.to_si(printed), find_row or (lambda _: offset)
+    """Return the step (s) of times in a unit, or else the times (s), checked against the requested step.
+
+    A function returns the offset of a row in the file.
+    """
+    times, offset = unit.to_si(printed), find_row(0)
     fault = find_first_fault(times)
     step = fit_even_step(printed) if fault is None and len(printed) > 1 else None
     if step is not None:
@@ -190,9 +187,7 @@ class Channel:
     def __repr__(self) -> str:
         sampling = f"in steps of {self.dt:g} s" if self.dt is not None else "at uneven times"
         peak = float(np.abs(self.acceleration).max(initial=0.0))
-        peaks = f"peak {peak:.5g} m/s^2 ({peak / STANDARD_GRAVITY:.4g} g)"
-        in_file = f", {self.units} in the file" if self.units else ""
-        return f"<Channel: {self.label}, {len(self.acceleration)} samples {sampling}, {peaks}{in_file}>"
+        return f"<Channel: {self.label}, {len(self.acceleration)} samples {sampling}, peak {peak:.5g} m/s^2>"
 
     @property
     def label(self) -> str:
@@ -262,22 +257,21 @@ def create_channel(
     format_name: str,
     values: Floats,
     unit: Unit,
-    offset: int | None,
+    find_row: Callable[[int], int | None],
     *,
     spelling: str = "",
     facts: Mapping[str, str] | None = None,
-    find_row: Callable[[int], int] | None = None,
     **fields: Any,
 ) -> Channel:
-    """Create the channel of numbers in a unit at an offset of a file."""
+    """Create the channel of numbers in a unit, for which a function returns the offset of a row in the file."""
     if len(values) < 2:
-        raise source.error(f"{len(values)} values are too few for a record; use the complete file", offset)
+        raise source.error(f"{len(values)} values are too few for a record; use the complete file", find_row(0))
     acceleration = unit.to_si(values)
     if np.isinf(acceleration).any():
-        raise source.error("some values are too large for an acceleration; check the file and its units", offset)
+        raise source.error("some values are too large for an acceleration; check the file and its units", find_row(0))
     gap = find_missing_value(values)
     if gap is not None:
-        raise missing_value_error(source, values[gap], find_row(gap) if find_row else offset)
+        raise missing_value_error(source, values[gap], find_row(gap))
     all_facts = {"format": format_name, "file": Path(source.path).name, **(facts or {})}
     metadata = {key: fact for key, fact in all_facts.items() if fact}
     return Channel(acceleration=acceleration, units=spelling or unit.name, metadata=metadata, **fields)

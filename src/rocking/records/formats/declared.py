@@ -88,9 +88,7 @@ class Format:
     """Declaration of a format: a table of `declared.toml`."""
 
     name: str  # name for the user
-    agency: str  # origin of such files, for the documentation
-    recognised: str  # mark, for the documentation
-    units: str  # units, for the documentation
+    documentation: Mapping[str, str]  # agency, mark and units, for the table of formats
     marks: tuple[str, ...]  # patterns in the first lines, of which the first one begins a channel
     header: str  # pattern of all lines of a channel's header
     statement_patterns: tuple[str, ...]  # patterns with statements as named groups
@@ -211,9 +209,9 @@ class _Header:
         if counts:
             return StatedCount(*counts[0])
         duration, rate = self.find_number("duration"), self.find_number("rate")
+        if not duration * rate and self.form.is_paired:
+            self._reject("the header states no number of values", self.offset)
         if not duration * rate:
-            if self.form.is_paired:
-                self._reject("the header states no number of values", self.offset)
             return StatedCount(0.0, self.offset, math.inf)
         # The duration is in whole seconds. Fewer samples, or a surplus of a second, are errors.
         return StatedCount(duration * rate, self.statements["duration"][0].offset, max_surplus=max(rate - 1.0, 0.0))
@@ -265,12 +263,12 @@ class _Header:
             if len(values) % 2 or len(values) < 4:
                 self._reject("expected pairs of time and acceleration", self.offset, "correct the file")
             instants, values = _merge_repeated(values[0::2], values[1::2])
-            dt, times = resolve_timing(source, request, instants, SECOND, self.offset)
+            dt, times = resolve_timing(source, request, instants, SECOND, lambda _: self.offset)
         if len(values) % len(columns):
             self._reject(f"{len(values)} values do not fill {len(columns)} columns", self.end)
         table = values.reshape(-1, len(columns))
         if columns[0].lower() == "time":
-            printed, _ = resolve_timing(source, request, table[:, 0], SECOND, self.end)
+            printed, _ = resolve_timing(source, request, table[:, 0], SECOND, lambda _: self.end)
             if printed is None or step is None or abs(printed - step) > 1e-4 * printed:
                 self._reject(
                     f"the header states a sampling step of {step:g} s, but the times are in other steps", place
@@ -280,19 +278,17 @@ class _Header:
         channels = []
         for index, (name, column) in enumerate(zip(columns, table.T, strict=True)):
             labels = self._find_labels(name, index)
-            channels.append(create_channel(source, form.name, column, unit, self.offset, **fields, **labels))
+            channels.append(create_channel(source, form.name, column, unit, lambda _: self.offset, **fields, **labels))
         self._check_peaks([channel.acceleration for channel in channels], unit)
         return channels
 
     def _read_values(self, end: int, count: StatedCount, multiple: int) -> Floats:
         """Read a multiple of the stated number of values, times the stated factor."""
-        texts = self.form.layouts
-        layouts = [Layout.find(self.lines[-1].text), *map(Layout.find, texts)]
-        known_layouts = [layout for layout in layouts if layout]
-        padding = known_layouts[0].per_line if self.form.is_padded else 0
+        layouts = [*filter(None, map(Layout.find, (self.lines[-1].text, *self.form.layouts)))]
+        padding = layouts[0].per_line if self.form.is_padded else 0
         size = count.number * multiple + sum(float(statement.text) for statement in self.statements["further"])
         stated = StatedCount(size, count.offset, (count.max_surplus + padding) * multiple)
-        values = read_values(self.source, self.end, end, known_layouts, stated)
+        values = read_values(self.source, self.end, end, layouts, stated)
         if self.statements["count"]:
             values = values[: int(count.number * multiple)]
         missing = float(self.find("missing", "nan"))
@@ -312,6 +308,7 @@ class _Header:
             with contextlib.suppress(ValueError):
                 start = datetime.strptime(f"{self.find('start')}+0000", f"{pattern}%z").timestamp()
                 start -= 3600.0 * float(self.find("zone", "0"))
+        facts = {key[5:].replace("_", " "): self.find(key) for key in self.statements if key.startswith("fact_")}
         return {
             "name": name or (f"channel {ordinal}" if form.has_several_channels else "acceleration"),
             "number": ordinal,
@@ -319,9 +316,7 @@ class _Header:
             "station": ".".join(filter(None, (self.find("network"), self.find("station")))),
             "event": f"{event}, magnitude {magnitude}" if magnitude else event,
             "start": start,
-            "facts": {
-                name[5:].replace("_", " "): self.find(name) for name in self.statements if name.startswith("fact_")
-            },
+            "facts": facts,
         }
 
     def _check_peaks(self, accelerations: list[Floats], unit: Unit) -> None:

@@ -88,7 +88,7 @@ def parse_heading(source: Source, end: int, count: int, delimiter: str) -> Headi
         unnamed = (times,) * (count > 1) + (channel,) * max(count - 1, 1)
         return Heading(unnamed, False, start, count > 1, is_spectrum)
     cells = list(zip(names, upper_names, strict=True)) if upper_names else [(name,) for name in names]
-    kinds = [_classify_column(cell) for cell in cells] if count > 1 else [_classify_single_column(cells[0])]
+    kinds: list[ColumnKind] = [_classify_column(cell) for cell in cells] if count > 1 else ["channel"]
     labels = [_find_label(cells[index]) for index, kind in enumerate(kinds) if kind == "time"]
     # "T" also denotes periods.
     has_certain_times = any(_TIMES - {"t"} & _split_words(cell) or "T" not in _WORD.findall(cell) for cell in labels)
@@ -97,15 +97,12 @@ def parse_heading(source: Source, end: int, count: int, delimiter: str) -> Headi
     units = [_find_cell_unit(cell, context if index == count - 1 <= 1 else "") for index, cell in enumerate(cells)]
     if not labels and kinds[0] == "channel" and count > 1 and units[0][0] is None:
         kinds[0] = "time"
-    columns = (
-        ColumnHeading(
-            kind, _remove_bracketed(_find_label(cell)), *(_find_times_unit(cell, context) if kind == "time" else unit)
-        )
-        for kind, cell, unit in zip(kinds, cells, units, strict=True)
-    )
-    return Heading(
-        tuple(columns), True, start, count > 1 and not labels, not has_certain_times if count > 1 else is_spectrum
-    )
+    columns = []
+    for kind, cell, unit in zip(kinds, cells, units, strict=True):
+        column_unit = _find_times_unit(cell, context) if kind == "time" else unit
+        columns.append(ColumnHeading(kind, _remove_bracketed(_find_label(cell)), *column_unit))
+    may_be_spectrum = not has_certain_times if count > 1 else is_spectrum
+    return Heading(tuple(columns), True, start, count > 1 and not labels, may_be_spectrum)
 
 
 def _classify_column(cell: tuple[str, ...]) -> ColumnKind:
@@ -127,15 +124,6 @@ def _classify_column(cell: tuple[str, ...]) -> ColumnKind:
         _parse_time_unit(cell[0]) and bare_unit and (bare_unit.multiplier == 1.0 or cell[0] != _strip_brackets(cell[0]))
     )
     return "time" if words & _TIMES or is_time_unit else "channel"
-
-
-def _classify_single_column(cell: tuple[str, ...]) -> ColumnKind:
-    """Return the kind of a single column, possibly below a title: times only if nothing else is named."""
-    name = _find_label(cell)
-    words = {word for word in _split_words(name) if not (find_unit(word) or find_time_unit(word))} - {"in"}
-    is_unclear = words == {"t"} and not any(map(_parse_time_unit, cell))
-    is_certain = words and words <= _TIMES | _SPECTRA and not is_unclear and not re.search(r"\d", name)
-    return _classify_column(cell) if is_certain else "channel"
 
 
 def _find_label(cell: tuple[str, ...]) -> str:

@@ -62,12 +62,6 @@ class Layout(NamedTuple):
         sizes = [int(size) for size in match.groups() if size] if match else []
         return cls(*sizes) if sizes and all(sizes) else None
 
-    def split_line(self, line: bytes) -> list[bytes]:
-        """Return the fields of a line, or the unchanged line if it does not fit."""
-        if len(line) > self.per_line * self.width or b"\t" in line:
-            return [line.strip()]
-        return [line[i : i + self.width] for i in range(0, len(line), self.width)]
-
 
 def find_numeric_end(source: Source, start: int) -> int:
     """Return the offset of the first line from `start` that is not numeric, or the file's end."""
@@ -148,10 +142,14 @@ def _read_blocks(source: Source, start: int, end: int, layout: Layout | None) ->
 
 
 def _split_tokens(text: bytes, layout: Layout | None) -> list[bytes]:
-    """Split at blanks, or into columns, of which the last in a line may be missing."""
+    """Split at blanks, or into columns, of which the last in a line may be missing, if the line fits."""
     if layout is None:
         return text.split()
-    return [field for line in text.split(b"\n") for field in layout.split_line(line.rstrip())]
+    tokens, (per_line, width) = list[bytes](), layout
+    for line in map(bytes.rstrip, text.split(b"\n")):
+        is_fitting = len(line) <= per_line * width and b"\t" not in line
+        tokens += [line[k : k + width] for k in range(0, len(line), width)] if is_fitting else [line.strip()]
+    return tokens
 
 
 def _find_first_invalid(source: Source, offset: int, layout: Layout | None) -> tuple[bytes, int]:

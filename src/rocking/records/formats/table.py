@@ -10,6 +10,7 @@ above, are ambiguous and rejected.
 from __future__ import annotations
 
 import functools
+import io
 import itertools
 import math
 import re
@@ -94,32 +95,36 @@ class _TextTable(NamedTuple):
     damaged: tuple[bytes, int] | None  # invalid number in a row before it, and the offset of that row
     heading: Heading  # names and units of the columns
 
-    @property
-    def is_ambiguous(self) -> bool:
-        """Whether commas may be decimal signs or delimiters, as in rows such as "1,5" without any point."""
+    def _is_ambiguous(self, row: str) -> bool:
+        """Return whether commas may be decimal signs or delimiters, as in the row "1,5" of a file without points."""
         # A comma before blanks or at the end of a row is not a decimal sign.
         return (
             self.delimiter == ","
             and self.column_count <= 2
-            and _DECIMAL_COMMA.fullmatch(self.source.read_line(self.start).text.strip().strip('"')) is not None
+            and _DECIMAL_COMMA.fullmatch(row.strip('"')) is not None
             and b"." not in self.source.data[self.start :]
             and not (self.column_count == 2 and self.heading.has_names)
+        )
+
+    def identify(self, name: str) -> Identification:
+        """Return the format of this name with the content of rows as reason."""
+        numbers = f"{self.column_count} numbers, between them {_DELIMITERS[self.delimiter]}"
+        numbers = "one number" if self.column_count == 1 else numbers
+        return Identification(
+            name, f"from line {self.source.find_line_number(self.start)} on each line holds {numbers}"
         )
 
     def read(self, request: Request) -> list[Channel]:
         """Return the channels of the file: one, unless a heading names several."""
         source = self.source
         if self.damaged is not None:
-            text = (
-                f"{self.damaged[0][:40].decode('latin-1')!r} is not a number, but this line resembles a row of numbers"
-            )
-            raise source.error(f"{text}; correct it, or begin the line with # if it is a heading", self.damaged[1])
-        if self.is_ambiguous:
-            text = (
-                f"{source.read_line(self.start).text.strip()!r} may be one number with a decimal comma, or two numbers"
-            )
+            token, offset = self.damaged
+            text = f"{token[:40].decode('latin-1')!r} is not a number, but this line resembles a row of numbers"
+            raise source.error(f"{text}; correct it, or begin the line with # if it is a heading", offset)
+        row = source.read_line(self.start).text.strip()
+        if self._is_ambiguous(row):
             advice = "use a point as the decimal sign, and separate numbers by blanks"
-            raise source.error(f"{text}; {advice}", self.start)
+            raise source.error(f"{row!r} may be one number with a decimal comma, or two numbers; {advice}", self.start)
         numbers = self._read_numbers().reshape(-1, self.column_count)
         heading, dt = self.heading, request.dt
         is_assumed = heading.assumes_times and heading.has_names and heading.columns[0].kind == "time"
@@ -135,7 +140,6 @@ class _TextTable(NamedTuple):
             raise self.create_spectrum_error("no value is negative, and no column is named 'time'")
         if not times:
             self._check_step(request.dt)
-        self._check_row_numbers(numbers)
         is_overruled = request.unit is not None and not request.are_defaults
         channels = []
         for number, column in enumerate(chosen, 1):
@@ -149,8 +153,8 @@ class _TextTable(NamedTuple):
             fields |= {"facts": {"heading units": heading_unit}, "number": number}
             fields["name"] = Path(self.source.path).stem if self.column_count <= 2 and len(chosen) == 1 else name
             unit = request.resolve_unit(self.source, None if is_overruled else unit or unknown_unit, offset)
-            values, fields["find_row"] = numbers[:, column], self._find_row_offset
-            channels.append(create_channel(self.source, "text table", values, unit, self.start, **fields))
+            values, find_row = numbers[:, column], self._find_row_offset
+            channels.append(create_channel(self.source, "text table", values, unit, find_row, **fields))
         return channels
 
     def create_spectrum_error(self, reason: str) -> RecordError:
@@ -169,17 +173,8 @@ class _TextTable(NamedTuple):
             text = f"the unit of the times is unclear from {unknown_unit!r} in the heading"
             advice = "name s, ms, us, ns, min, h or d in their column, as 'time (ms)'"
             raise self.source.error(f"{text}; {advice}", self.heading.offset)
-        dt, instants = resolve_timing(self.source, request, numbers[:, column], unit, self.start, self._find_row_offset)
+        dt, instants = resolve_timing(self.source, request, numbers[:, column], unit, self._find_row_offset)
         return {"dt": dt, "times": instants, "start": float(unit.to_si(numbers[:1, column])[0])}
-
-    def _check_row_numbers(self, numbers: Floats) -> None:
-        """Raise an error if row numbers have a gap."""
-        for column in self.heading.find_columns("count"):
-            steps = np.diff(numbers[:, column])
-            faults = np.flatnonzero(np.abs(steps - steps[:1]) > 1e-6)
-            if len(faults):
-                text = "the number of this row does not follow the previous one; use a record without gaps"
-                raise self.source.error(text, self._find_row_offset(int(faults[0]) + 1))
 
     def _check_step(self, dt: float | None) -> None:
         """Raise an error for a table without times if the step is missing or differs from its heading."""
@@ -222,19 +217,17 @@ class _TextTable(NamedTuple):
         return np.concatenate(parts)
 
     def _yield_rows(self) -> Iterator[tuple[list[bytes], int]]:
-        data, start = self.source.data, self.start
-        while start < len(data):
-            end = data.find(b"\n", start)
-            end = len(data) if end < 0 else end
-            line = data[start:end].strip()
+        stream, offset = io.BytesIO(self.source.data), self.start
+        stream.seek(offset)
+        for raw in stream:
+            line = raw.strip()
             if line and not _COMMENT.match(line):
                 if len(line) > _ROW_LIMIT:
-                    raise self.source.error(
-                        f"this row is {len(line)} characters long, too long for a row of numbers; correct it", start
-                    )
+                    text = f"this row is {len(line)} characters long, too long for a row of numbers; correct it"
+                    raise self.source.error(text, offset)
                 if tokens := line.translate(self.translation).split():
-                    yield tokens, start
-            start = end + 1
+                    yield tokens, offset
+            offset += len(raw)
 
     def _find_row_offset(self, index: int) -> int:
         """Return the offset of a row."""
@@ -252,19 +245,13 @@ def recognise_table(source: Source) -> Recognised | None:
     table = _find_table(_convert_clock_times(source))
     if table is None or (table.column_count > 2 and not table.heading.has_names):
         return None
-    numbers_text = f"{table.column_count} numbers, between them {_DELIMITERS[table.delimiter]}"
-    row_text = "one number" if table.column_count == 1 else numbers_text
-    reason = f"from line {source.find_line_number(table.start)} on each line holds {row_text}"
-    return Identification("text table", reason), table.read
+    return table.identify("text table"), table.read
 
 
 def recognise_wrapped(source: Source) -> Recognised | None:
     """Recognise rows of more numbers without a heading, which are one series if its step is specified."""
     table = _find_table(source)
-    if table is None:
-        return None
-    reason = f"from line {source.find_line_number(table.start)} on each line holds {table.column_count} numbers"
-    return Identification("wrapped numbers", reason), functools.partial(_read_wrapped, table)
+    return None if table is None else (table.identify("wrapped numbers"), functools.partial(_read_wrapped, table))
 
 
 def _read_wrapped(table: _TextTable, request: Request) -> list[Channel]:
@@ -282,7 +269,9 @@ def _read_wrapped(table: _TextTable, request: Request) -> list[Channel]:
     if len(first) > 2 and find_first_fault(first) is None and fit_even_step(first) is not None:
         raise source.error(f"{text}, of which the first ones seem to be times; {advice}", start)
     unit, name = request.resolve_unit(source, None, start), Path(source.path).stem
-    return [create_channel(source, "wrapped numbers", values, unit, start, dt=request.dt, name=name, number=1)]
+    return [
+        create_channel(source, "wrapped numbers", values, unit, lambda _: start, dt=request.dt, name=name, number=1)
+    ]
 
 
 def _convert_clock_times(source: Source) -> Source:

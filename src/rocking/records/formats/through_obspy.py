@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import importlib.util
 import io
 import re
 import warnings
@@ -23,12 +24,7 @@ _SERIES_TITLE = re.compile(rb"(?m)^TIMESERIES [^\n]*?, (\d{1,12}) samples,")
 
 def is_obspy_installed() -> bool:
     """Return whether ObsPy can be imported."""
-    with warnings.catch_warnings(), contextlib.suppress(ImportError):
-        warnings.simplefilter("ignore")
-        import obspy  # noqa: F401
-
-        return True
-    return False
+    return importlib.util.find_spec("obspy") is not None
 
 
 def recognise_with_obspy(source: Source) -> Recognised | None:
@@ -75,7 +71,7 @@ def _convert_trace(source: Source, request: Request, unit: Unit, trace: Any, nam
         f"{name} (through ObsPy)",
         values,
         unit,
-        None,
+        lambda _: None,
         name=str(stats.channel) or f"trace {number}",
         number=number,
         dt=request.check_step(source, float(stats.delta), None),
@@ -107,14 +103,10 @@ def _find_claiming_readers(source: Source) -> list[str]:
             # A reader that fails on foreign bytes (with any exception) does not claim them.
             with contextlib.suppress(Exception):
                 is_format = buffered_load_entry_point("obspy", f"obspy.plugin.waveform.{name}", "isFormat")
-                if is_format(_open_copy(source)):
+                # ObsPy's check for GCF writes to its input.
+                if is_format(io.BytesIO(bytearray(source.raw))):
                     claims.append(str(name))
     return claims
-
-
-def _open_copy(source: Source) -> io.BytesIO:
-    """Return a copy of the file's bytes, because ObsPy's check for GCF writes to its input."""
-    return io.BytesIO(bytearray(source.raw))
 
 
 def _read_traces(source: Source, name: str, *, headonly: bool = False) -> Any:
@@ -127,7 +119,7 @@ def _read_traces(source: Source, name: str, *, headonly: bool = False) -> Any:
         # A failure of MiniSEED's own check of its numbers is only a warning.
         warnings.simplefilter("error", InternalMSEEDWarning)
         try:
-            traces = obspy.read(_open_copy(source), format=name, headonly=headonly)
+            traces = obspy.read(io.BytesIO(source.raw), format=name, headonly=headonly)
         except Exception as error:
             # ObsPy's readers raise any exception from their parsing.
             return " ".join(str(error).split())[:200] or type(error).__name__
