@@ -17,13 +17,14 @@ from rocking.records.units import Unit
 def read_files(folder: Path) -> list[str]:
     """Return a table with a row for each format, and a line for each file that is not read."""
     found: dict[str, list[tuple[list[float], tuple[Channel, ...]]]] = defaultdict(list)
-    unread, stated, find_peak = list[str](), list[float](), Header.find_peak
+    unread, stated, find_peaks = list[str](), list[float](), Header.find_peaks
 
-    def find_and_keep(header: Header, index: int, unit: Unit) -> float:
-        stated.append(find_peak(header, index, unit))
-        return stated[-1]
+    def find_and_keep(header: Header, count: int, unit: Unit) -> list[float]:
+        peaks = find_peaks(header, count, unit)
+        stated.extend([*peaks, *[0.0] * count][:count])
+        return peaks
 
-    setattr(Header, "find_peak", find_and_keep)  # noqa: B010 - mypy allows no other assignment
+    setattr(Header, "find_peaks", find_and_keep)  # noqa: B010 - mypy allows no other assignment
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         stated.clear()
         try:

@@ -121,7 +121,7 @@ class Format:
     def _read_channels(self, source: Source, start: int | None, request: Request) -> list[Channel]:
         channels: list[Channel] = []
         while start is not None:
-            header = _Header(source, self, start, len(channels) + 1)
+            header = Header(source, self, start, len(channels) + 1)
             end = self._find_end(source, header.end)
             quantity = header.find("quantity", "acceleration").lower()
             channels += header.create_channels(end, request) if quantity.startswith("acc") else []
@@ -151,7 +151,7 @@ class Format:
         return None if line is None else line.start
 
 
-class _Header:
+class Header:
     """Header of one channel: its lines, its statements by name, and the offset of its end."""
 
     def __init__(self, source: Source, form: Format, start: int, ordinal: int) -> None:
@@ -319,19 +319,20 @@ class _Header:
             "facts": facts,
         }
 
-    def _check_peaks(self, accelerations: list[Floats], unit: Unit) -> None:
-        """Raise an error if the peak of a component contradicts the stated one, as with another unit."""
+    def find_peaks(self, count: int, unit: Unit) -> list[float]:
+        """Return the stated peaks of this many components, m/s^2, or 0."""
         peaks = [[abs(float(number)) for number in re.findall(NUMBER, each.text)] for each in self.statements["peak"]]
-        if len(peaks) == 1 < len(accelerations):
+        if len(peaks) == 1 < count:
             peaks = [[number] for number in peaks[0]]
         peak_unit = find_unit(self.find("peak_units")) or unit
-        for acceleration, numbers in zip(accelerations, peaks, strict=False):
-            stated = float(peak_unit.to_si(np.array(max(numbers, default=0.0))))
-            found = [float(np.abs(values).max()) for values in (acceleration, acceleration - acceleration.mean())]
-            if stated > 0.0 and all(
-                peak > 0.0 and not 1.0 / _PEAK_RATIO < peak / stated < _PEAK_RATIO for peak in found
-            ):
-                text = f"the header states a peak of {stated:.4g} m/s^2, but the largest value is {found[0]:.4g} m/s^2"
+        return [float(peak_unit.to_si(np.array(max(numbers, default=0.0)))) for numbers in peaks]
+
+    def _check_peaks(self, accelerations: list[Floats], unit: Unit) -> None:
+        """Raise an error if the peak of a component contradicts the stated one, as with another unit."""
+        for acceleration, stated in zip(accelerations, self.find_peaks(len(accelerations), unit), strict=False):
+            peaks = [float(np.abs(values).max()) for values in (acceleration, acceleration - acceleration.mean())]
+            if stated and all(peak > 0.0 and not 1.0 / _PEAK_RATIO < peak / stated < _PEAK_RATIO for peak in peaks):
+                text = f"the header states a peak of {stated:.4g} m/s^2, but the largest value is {peaks[0]:.4g} m/s^2"
                 self._reject(text, self.offset, "check the units, or download the file again")
 
 
