@@ -19,7 +19,7 @@ from rocking.records.formats.source import Request
 from rocking.records.named import correct_motion, expand_record_names, is_shipped, make_names_unique, split_factor
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Components:
     """Components of one station and event.
 
@@ -50,23 +50,6 @@ class Components:
     horizontals: tuple[Motion, ...]
     vertical: Motion | None = None
 
-    def __repr__(self) -> str:
-        vertical = "" if self.vertical is None else " and the vertical one"
-        return f"<Components: {self.station}, {self.event}: {len(self.horizontals)} horizontal{vertical}>"
-
-    def motions(self, *, with_vertical: bool = False) -> tuple[Motion, Motion]:
-        """Return both horizontal components, each with the other as orthogonal component.
-
-        With `with_vertical`, both have the vertical component. Raises `RecordError` if there are not two horizontal
-        components or there is no vertical one.
-        """
-        first, second = self.pair
-        if with_vertical and self.vertical is None:
-            raise RecordError(f"{escape_braces(self.station)} has no vertical component")
-        vertical = self.vertical if with_vertical else None
-        first, second = first.with_orthogonal(second), second.with_orthogonal(first)
-        return first.with_vertical(vertical), second.with_vertical(vertical)
-
     @property
     def pair(self) -> tuple[Motion, Motion]:
         """The two horizontal components.
@@ -86,11 +69,8 @@ class Components:
 def group_components(
     names: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
     *,
-    dt: float | None = None,
-    units: str | None = None,
-    baseline: int | str | None = None,
-    highpass: float | None = None,
     keep_going: bool = True,
+    **options: Any,
 ) -> tuple[Components, ...]:
     """Read all channels of records and group those of one station and event.
 
@@ -98,10 +78,10 @@ def group_components(
     ----------
     names : str, path, or iterable of these
         Files, folders, patterns, ZIP archives and shipped records.
-    dt, units, baseline, highpass : optional
-        As for `rocking.read`, for files that do not state step and units.
     keep_going : bool
         Whether files that cannot be read are skipped with a note. Otherwise the first one raises its error.
+    **options : optional
+        Options of `rocking.read`: dt and units for files that do not state them, baseline and highpass.
 
     Returns
     -------
@@ -124,8 +104,7 @@ def group_components(
     >>> [group.station for group in group_components("ridgecrest-*")]
     ['CI.CLC China Lake, G2 Tower Rd.', 'CI.TOW2 Tower 2']
     """
-    request = Request.create(dt, units, baseline=baseline, highpass=highpass, are_defaults=True)
-    groups, reasons = _read_groups(names, request, keep_going=keep_going)
+    groups, reasons = _read_groups(names, Request.create(**options, are_defaults=True), keep_going=keep_going)
     note_skipped(reasons)
     return groups
 
@@ -230,7 +209,7 @@ def collect_pairs(
     for group in groups:
         is_single = with_singles and len(group.horizontals) != 2
         try:
-            motions += group.horizontals if is_single else group.motions(with_vertical=with_vertical)
+            motions += group.horizontals if is_single else _pair_components(group, with_vertical=with_vertical)
         except (RecordError, MotionError) as error:
             reasons[group.station] = str(error).removeprefix(f"{group.station} ")
         if with_singles and not with_vertical and group.vertical is not None:
@@ -239,6 +218,15 @@ def collect_pairs(
         reason = ": ".join(next(iter(reasons.items()), ("there are no records",)))
         raise RecordError(f"no station has a pair of horizontal components: {escape_braces(reason)}")
     return tuple(motions), reasons
+
+
+def _pair_components(group: Components, *, with_vertical: bool) -> tuple[Motion, Motion]:
+    """Return both horizontal components with each other as orthogonal component, optionally with the vertical one."""
+    (first, second), vertical = group.pair, group.vertical if with_vertical else None
+    if with_vertical and vertical is None:
+        raise RecordError(f"{escape_braces(group.station)} has no vertical component")
+    pair = first.with_orthogonal(second), second.with_orthogonal(first)
+    return pair[0].with_vertical(vertical), pair[1].with_vertical(vertical)
 
 
 def separate_verticals(

@@ -30,10 +30,9 @@ def is_obspy_installed() -> bool:
 def recognise_with_obspy(source: Source) -> Recognised | None:
     """Return the first format whose ObsPy reader claims the file (and, of several, can read it)."""
     claims = _find_claiming_readers(source) if is_obspy_installed() else []
-    readable = (name for name in claims if len(claims) == 1 or not isinstance(_read_traces(source, name), str))
     if not claims:
         return None
-    name = next(readable, claims[0])
+    name = min(claims, key=lambda claim: len(claims) > 1 and isinstance(_read_traces(source, claim), str))
     reason = f"ObsPy's {name} reader recognises it"
     return Identification(f"{name} (through ObsPy)", reason), functools.partial(_read_channels, source, name)
 
