@@ -290,7 +290,7 @@ def test_both_horizontal_channels_of_a_file_are_a_pair_and_its_vertical_is_named
     result = json.loads(printed)
     names = [entry["motion"] for entry in result["records"]]
     assert names == [f"station {k}.csv, {channel}" for k in range(4) for channel in ("N-S", "E-W")]
-    assert [*result["skipped"]] == [f"station {k}.csv, vertical" for k in range(4)]
+    assert [*result["skipped"]] == [f"station {k}.csv, U-D" for k in range(4)]
     peaks = [entry["pga_m_s2"] for entry in result["records"]]
     expected = [motion.pga for k in range(4) for motion in (motions[k], motions[k + 4])]
     assert peaks == pytest.approx(expected, rel=0.01)

@@ -662,10 +662,10 @@ def test_an_error_within_a_table_keeps_what_it_is_about(tmp_path):
     error = caught.value
     assert (error.argument, error.path, error.value) == ("restitution", str(ensemble), -0.5)
     outcomes.write_text("motion,overturned\nel-centro-meloland-270,1\nnothing.AT2,0\n")
-    with pytest.raises(rocking.errors.RecordError, match="line 3: dt must be a positive number") as caught:
+    with pytest.raises(rocking.errors.RecordError, match="line 2: dt must be a positive number") as caught:
         read_calibration(outcomes, channel=None, dt=-1.0, units=None)
     error = caught.value
-    assert (error.argument, error.path, error.line, error.value) == ("dt", str(outcomes), 3, -1.0)
+    assert (error.argument, error.path, error.line, error.value) == ("dt", str(outcomes), 2, -1.0)
 
 
 def test_rows_without_a_group_belong_to_none(tmp_path):

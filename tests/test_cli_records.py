@@ -4,6 +4,7 @@ import io
 import json
 import re
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -186,6 +187,65 @@ def test_errors_name_options(run, tmp_path):
     assert "--half-width" in run("simulate", RECORD, "--half-width", "-1", "--half-height", "1")[2]
     assert "half_width" not in run("simulate", RECORD, "--half-width", "-1", "--half-height", "1")[2]
     assert "--initial-velocity" in run("simulate", RECORD, *BLOCK, "--initial-velocity", "1e9")[2]
+
+
+def write_component(folder: Path, component: str, station: str = "Station") -> Path:
+    """Write a record of a component, as the PEER database titles it."""
+    samples = 0.4 * np.sin(np.linspace(0.0, 12.0, 120))
+    title = f"PEER\nEvent, 1/1/2000, {station}, {component}\nACCELERATION IN UNITS OF G\nNPTS= 120, DT= .02 SEC,\n"
+    folder.mkdir(exist_ok=True)
+    path = folder / f"{station}-{component}.AT2"
+    path.write_text(title + "".join(f"{value:.5f}\n" for value in samples))
+    return path
+
+
+#: Options of each command that reads folders of records.
+FOLDER_COMMANDS = {
+    "simulate": BLOCK, "check": BLOCK, "ida": BLOCK, "measures": BLOCK, "fragility": [*BLOCK, "--levels", "0.1g:1g:4"],
+    "spectrum": ["--alpha", "0.2", "--p", "2,3"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["folder", "archive", "pattern"])
+@pytest.mark.parametrize("command", FOLDER_COMMANDS)
+def test_a_vertical_record_of_a_folder_is_no_horizontal_motion(run, tmp_path, command, kind):
+    path = write_component(tmp_path / "records", "UP")
+    name = {"folder": path.parent, "archive": tmp_path / "records.zip", "pattern": path.parent / "*.AT2"}[kind]
+    with zipfile.ZipFile(tmp_path / "records.zip", "w") as archive:
+        archive.write(path, path.name)
+    code, out, err = run(command, name, *FOLDER_COMMANDS[command])
+    assert (code, out) == (2, "")
+    assert f"{path.name}: this record is vertical (channel 'UP'); add a horizontal record of its station" in err
+    assert err.count("\n") == 1 and "--vertical" in err
+
+
+def test_a_vertical_record_is_skipped_beside_horizontal_ones_and_used_where_it_is_named(run, tmp_path):
+    folder = tmp_path / "records"
+    up = write_component(folder, "UP")
+    level = write_component(folder, "090")
+    code, out, err = run("simulate", folder, *BLOCK, "--json")
+    assert code == 0 and f"skipped: {up}: this record is vertical (channel 'UP')" in err
+    found = json.loads(out)
+    assert [row["record"] for row in found["records"]] == [str(level)] and [*found["skipped"]] == [str(up)]
+    code, _, err = run("simulate", up, *BLOCK)
+    assert code == 0 and "looks vertical" in err
+    code, _, err = run("simulate", folder, *BLOCK, "--channel", "UP")
+    assert code == 0 and "looks vertical" in err
+    write_component(folder, "UP", "Other")
+    code, _, err = run("simulate", folder, *BLOCK)
+    assert code == 2 and "Other-UP.AT2: this record is vertical" in err
+    code, out, err = run("simulate", folder, *BLOCK, "--keep-going")
+    assert code == 0 and err.count("skipped: ") == 2
+
+
+def test_a_study_refuses_a_folder_of_only_vertical_records(tmp_path):
+    write_component(tmp_path / "records", "UP")
+    file, text = tmp_path / "study.toml", "[blocks]\nwidth = 0.5\nheight = 2.0\n[scales]\npga = [1.0]\n[motions]\n"
+    file.write_text(text + 'records = ["records"]\n')
+    with pytest.raises(rocking.errors.RecordError, match=r"Station-UP.AT2.* is vertical \(channel 'UP'\)"):
+        rocking.studies.read_study(file)
+    file.write_text(text + 'records = ["records/Station-UP.AT2"]\n')
+    assert len(rocking.studies.read_study(file).product.motions) == 1
 
 
 def test_a_path_is_not_taken_for_an_option(run, tmp_path):

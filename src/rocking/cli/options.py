@@ -241,7 +241,7 @@ class FileOptions(InputOptions):
         """Return the options as a request, possibly as defaults for several files."""
         return Request.create(**self.read_options(), are_defaults=are_defaults)
 
-    def read_motion(self, name: str, *, are_defaults: bool = False, is_pulse: bool = False) -> Motion:
+    def read_motion(self, name: str, *, is_pulse: bool = False) -> Motion:
         """Return the scaled motion of a record or pulse, with notes."""
         vertical = self.supplied_texts().get("vertical")
         target = self._read_target()  # mistakes in the options are reported before a long file is read
@@ -250,7 +250,7 @@ class FileOptions(InputOptions):
             if vertical is not None:
                 motion = motion.with_vertical(load_vertical(vertical, name, self.create_request()))
         else:
-            motion = load_motion(name, self.create_request(are_defaults=are_defaults), vertical)
+            motion = load_motion(name, self.create_request(), vertical)
         return self._scale_motion(name, motion, target)
 
     def _read_target(self) -> tuple[float, Measure] | None:
@@ -363,11 +363,17 @@ class _RecordOptions(FileOptions):
             accepts_pairs and records and not has_channel_names and STANDARD_INPUT not in records
         ):
             return self._load_pairs(records, [*pulses, *stochastic], has_channel_names=has_channel_names)
-        pulse_motions = self.create_pulses()
-        read = functools.partial(self.read_motion, are_defaults=len(records) > 1)
-        motions, skipped = read_records(records, read, keep_going=self.keep_going)
-        motions, reasons = separate_verticals(motions, names, keep_going=self.keep_going)
-        skipped |= {name: f"{name}: {reason}" for name, reason in reasons.items()}
+        pulse_motions, target = self.create_pulses(), self._read_target()
+        vertical_name = self.supplied_texts().get("vertical")
+        request = self.create_request(are_defaults=len(records) > 1)
+        load = functools.partial(load_motion, request=request, vertical_name=vertical_name)
+        loaded, skipped = read_records(records, load, keep_going=self.keep_going)
+        exempt = loaded if "channel" in self.supplied_texts() else names  # a user may choose a vertical component
+        loaded, verticals = separate_verticals(loaded, exempt, keep_going=self.keep_going)
+        motions, unscaled = read_records(
+            [*loaded], lambda name: self._scale_motion(name, loaded[name], target), keep_going=self.keep_going
+        )
+        skipped |= unscaled | {name: f"{name}: {reason}" for name, reason in verticals.items()}
         messages = [*skipped.values()]
         if records and not motions:
             raise RecordError(f"none of {len(records)} records could be used; the first: {messages[0]}")

@@ -55,6 +55,8 @@ def list_motions(motions: Motions) -> list[Motion]:
 def index_motions(motions: Motions) -> dict[str, Motion]:
     """Return motions by the names of a mapping, or else by their own."""
     motion_list = list_motions(motions)
+    if isinstance(motions, Mapping):
+        return dict(motions)
     return dict(zip(list_motion_names(motion_list), motion_list, strict=True))
 
 

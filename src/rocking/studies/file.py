@@ -311,7 +311,8 @@ def _load_motions(tables: Tables, scales: ScalingLevels) -> tuple[list[Motion], 
                 raise
             skipped.append(str(error))
             loaded.pop(path, None)
-    exempt = [path for path, name in names_by_path.items() if path in (name, str(folder / name))]
+    is_chosen = "channel" in entries
+    exempt = [path for path, name in names_by_path.items() if is_chosen or path in (name, str(folder / name))]
     with tables.locating_record_errors(""):
         loaded, reasons = separate_verticals(loaded, exempt, keep_going=entries.get("skip_unreadable", False))
     skipped += [f"{path}: {reason}" for path, reason in reasons.items()]
