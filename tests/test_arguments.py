@@ -28,21 +28,13 @@ TAKES_A_MOTION = {
 
 @pytest.mark.parametrize("take", TAKES_A_MOTION)
 @pytest.mark.parametrize(
-    ("motion", "mend"),
-    [
-        (np.array([0.1, -0.2, 0.3]), "Motion.from_samples(array, dt)"),
-        ([0.1, -0.2, 0.3], "Motion.from_samples(array, dt)"),
-        (0.3, "Motion.from_samples(array, dt)"),
-        ("ridgecrest-clc-090", 'rocking.records.load("ridgecrest-clc-090")'),
-        ("RSN6.AT2", 'rocking.read("RSN6.AT2")'),
-        (Path("RSN6.AT2"), 'rocking.read("RSN6.AT2")'),
-        (BLOCK, "Motion.from_samples"),
-    ],
+    "motion", [np.array([0.1, -0.2]), [0.1, -0.2, 0.3], 0.3, "ridgecrest-clc-090", "RSN6.AT2", Path("RSN6.AT2"), BLOCK]
 )
-def test_what_is_no_motion_is_refused_and_told_how_to_become_one(take, motion, mend):
+def test_what_is_no_motion_is_refused_and_told_how_to_become_one(take, motion):
     with pytest.raises(MotionError) as caught:
         TAKES_A_MOTION[take](motion)
-    assert mend in str(caught.value)
+    for call in ("rocking.read(file)", "rocking.records.load(name)", "Motion.from_samples(array, dt), in m/s^2 and s"):
+        assert call in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

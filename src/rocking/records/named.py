@@ -78,8 +78,8 @@ def make_names_unique(names: Sequence[str]) -> list[str]:
 
 
 def _describe_wrong_type(value: Any) -> str:
-    advice = "load one with rocking.read(file) or rocking.records.load(name), or create one with Motion.from_samples"
-    return f"a Motion is required, not {checks.short_repr(value)}; {advice}"
+    advice = "load one with rocking.read(file) or rocking.records.load(name), or use Motion.from_samples(array, dt)"
+    return f"a Motion is required, not {checks.short_repr(value)}; {advice}, in m/s^2 and s"
 
 
 #: Name of a record with a factor.
