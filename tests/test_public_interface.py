@@ -21,7 +21,7 @@ SHAKES = {"motion", "motions", "pulse"}
 OTHER_WORDS = {"t": "time", "scale": "levels", "pga": "measure", "pgv": "measure", "sa": "measure"}
 
 #: What is built up step by step, within one call.
-CHANGING = {"Header", "OrbitEquations"}
+CHANGING = {"OrbitEquations"}
 
 #: Most parameters of one function.
 MOST = 13
