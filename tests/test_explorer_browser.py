@@ -709,24 +709,6 @@ def notebook(html):
         server.shutdown()
 
 
-@pytest.mark.parametrize("host", [pytest.param("127.0.0.1", marks=MORE), "localhost"])
-def test_a_response_is_explored_in_a_notebooks_frame(browser, host):
-    block = rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4)
-    response = rocking.simulate(block, rocking.pulses.one_sine(4.0, 1.0) + rocking.pulses.one_sine(1.0, 3.0))
-    frame = rocking.explore(response)
-    with notebook(frame._repr_html_()) as port:
-        context = browser.new_context(viewport=DESK)
-        page = context.new_page()
-        page.goto(f"http://{host}:{port}/")
-        figure = page.frame_locator("iframe").locator("#figures dd").first
-        figure.wait_for(timeout=60_000)
-        shown = figure.text_content()
-        context.close()
-    assert shown.startswith("overturns") == response.overturned
-    if not response.overturned:
-        assert as_number(shown) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
-
-
 def test_another_tab_has_the_secret_and_other_origins_have_nothing(browser, here):
     context = browser.new_context(viewport=DESK)
     first = Watched(context.new_page(), allowed=["CORS", "Failed to load", "403", "frame"])

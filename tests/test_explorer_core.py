@@ -20,8 +20,8 @@ from rocking.errors import BlockError, MotionError, OptionError, RecordError, Ro
 from rocking.explorer import maps
 from rocking.explorer.code import case_as_command, case_as_python, map_as_python
 from rocking.explorer.core import Explorer
-from rocking.explorer.inputs import read_case, response_to_texts
-from rocking.explorer.motions import create_pulse
+from rocking.explorer.inputs import block_to_texts, read_case
+from rocking.explorer.motions import create_pulse, motion_to_texts
 from rocking.explorer.parameters import DEFAULT
 from rocking.explorer.payload import pack
 from rocking.explorer.periodic import read_sweep
@@ -297,7 +297,7 @@ def test_code_names_a_motion_of_the_program_on_a_line_of_its_own(tmp_path):
     grid = maps.read_grid(case, {"x": "p", "y": "pga", "points": "8"})
     for code, peak in ((case_as_python(case), 3.0), *[(map_as_python(grid), None)]):
         (line,) = [
-            line for line in code.splitlines() if "# mymotion: the motion that this page was opened with" in line
+            line for line in code.splitlines() if "# mymotion: a motion of the study" in line
         ]
         variable = line.partition(" = ...")[0]
         script = tmp_path / "code.py"
@@ -308,43 +308,30 @@ def test_code_names_a_motion_of_the_program_on_a_line_of_its_own(tmp_path):
     del sys.modules["rocking_given"]
 
 
-RESPONSES = {
-    "sizes": lambda: rocking.simulate(
-        rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090")
-    ),
-    "scaled": lambda: rocking.simulate(
-        rocking.Block(width=0.24, height=1.1, restitution=0.8),
-        rocking.records.load("ridgecrest-clc-090").scaled_to(3.0),
-    ),
-    "two-sided": lambda: rocking.simulate(
-        rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4), rocking.pulses.one_sine(4.0, 1.0), model="linear"
-    ),
-    "off its middle": lambda: rocking.simulate(
-        rocking.Block(width=0.3, height=1.1, offset=0.03), rocking.pulses.one_sine(4.0, 1.0)
-    ),
-    "free": lambda: rocking.simulate(
-        rocking.Block(width=0.24, height=1.1, gravity=1.62), None, initial_rotation=0.05, initial_velocity=-0.1
-    ),
-    "own motion": lambda: rocking.simulate(
-        rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(4.0, 1.0) + rocking.pulses.ricker(1.0, 2.0),
-        chattering="velocity", duration=3.0,
-    ),
-    "processed": lambda: rocking.simulate(
+#: Blocks and motions as studies have them.
+SIMULATED = {
+    "sizes": (rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090")),
+    "restitution": (rocking.Block(width=0.24, height=1.1, restitution=0.8), rocking.pulses.ricker(4.0, 1.0)),
+    "two-sided": (rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4), rocking.pulses.one_sine(4.0, 1.0)),
+    "off its middle": (rocking.Block(width=0.3, height=1.1, offset=0.03), rocking.pulses.one_sine(4.0, 1.0)),
+    "moon": (rocking.Block(width=0.24, height=1.1, gravity=1.62), rocking.pulses.one_sine(2.0, 1.0)),
+    "own motion": (rocking.Block.from_parameters(2.0, 0.2), rocking.pulses.one_sine(4.0, 1.0) + rocking.pulses.ricker(1.0, 2.0)),
+    "processed": (
         rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090").processed(trim=(200.0, 250.0))
     ),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", RESPONSES)
-def test_a_response_written_as_a_case_is_the_same_response_bit_for_bit(name):
-    response = RESPONSES[name]()
-    uploads = UploadStore()
-    texts = response_to_texts(response, uploads)
-    again = read_case(texts, uploads).simulate()
-    assert np.array_equal(again.impacts, response.impacts)
-    assert np.array_equal(again.events, response.events)
-    assert again.peak_rotation == response.peak_rotation
-    assert again.duration == response.duration
+@pytest.mark.parametrize("factor", [1.0, 1.5])
+@pytest.mark.parametrize("name", SIMULATED)
+def test_a_block_and_a_motion_written_as_a_case_are_the_same_bit_for_bit(name, factor):
+    (block, motion), uploads = SIMULATED[name], UploadStore()
+    case = read_case(block_to_texts(block) | motion_to_texts(motion, uploads, factor), uploads)
+    again, expected = case.simulate(), rocking.simulate(block, motion.scaled(factor))
+    assert np.array_equal(again.impacts, expected.impacts)
+    assert np.array_equal(again.events, expected.events)
+    assert again.peak_rotation == expected.peak_rotation
+    assert again.duration == expected.duration
 
 
 # Windows

@@ -15,7 +15,7 @@ from explorer_answers import page_answer
 import rocking
 from rocking.explorer.code import case_as_command, case_as_python
 from rocking.explorer.core import Explorer
-from rocking.explorer.inputs import read_case, response_to_texts
+from rocking.explorer.inputs import read_case
 from rocking.explorer.uploads import UploadStore, clean_file_name
 
 BLOCK = {"width": "0.24", "height": "1.1"}
@@ -97,7 +97,7 @@ def test_a_channel_named_like_an_option_is_none(run, tmp_path, monkeypatch):
 def test_the_name_of_a_motion_ends_no_comment():
     explorer = Explorer()
     motion = rocking.Motion.from_samples(np.sin(np.arange(50.0)), dt=0.02, name="x\nimport os\rimport sys\x0cy")
-    response = rocking.simulate(rocking.Block(width=0.24, height=1.1), motion)
-    python = page_answer(explorer, "details", response_to_texts(response, explorer.uploads)).header["python"]
-    assert "# ximport osimport sysy: the motion" in python
+    texts = {**BLOCK, "motion": f"given:{explorer.uploads.add_motion(motion)}"}
+    python = page_answer(explorer, "details", texts).header["python"]
+    assert "# ximport osimport sysy: a motion of the study" in python
     assert len(ast.parse(python).body) == 6

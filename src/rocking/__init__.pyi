@@ -53,7 +53,6 @@ from .engine.schemes import (
     VelocityThreshold,
 )
 from .errors import RockingError
-from .explorer.launch import explore
 from .inputs.inventory import read_inventory
 from .motion import Motion
 from .motion.scaling import Measure
@@ -108,7 +107,6 @@ __all__ = [
     "critical_scale",
     "dynamics",
     "errors",
-    "explore",
     "fit_fragility",
     "fragility",
     "gradient",

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 from rocking.block import Block
-from rocking.block.single import require_block
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
 from rocking.errors import BlockError, MotionError, OptionError
 from rocking.explorer.meshes import MeshBody, find_pivots
-from rocking.explorer.motions import motion_to_texts, read_motion_values
+from rocking.explorer.motions import read_motion_values
 from rocking.explorer.parameters import BLOCK_NAMES, NAMES, PARAMETERS, SHAPES, Texts, Values, clean_texts
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.bodies import create_block, write_block_call
@@ -120,26 +119,6 @@ def require_possible(peak: float) -> None:
     """Reject a peak acceleration, m/s^2, that no motion can have, before the motions are created."""
     if peak > MAX_ACCELERATION:
         raise MotionError(TOO_STRONG)
-
-
-def response_to_texts(response: Response, uploads: UploadStore) -> dict[str, str]:
-    """Write a response as the texts of its case; the store keeps a motion that no text can name."""
-    block, motion = require_block(response.block), response.motion
-    texts = block_to_texts(block)
-    texts |= {"motion": "none"} if motion is None else motion_to_texts(motion, uploads)
-    if response.friction is not None:
-        texts["friction"] = ",".join(map(repr, dict.fromkeys(response.friction)))
-    if response.model != "nonlinear":
-        texts["model"] = response.model
-    if str(response.chattering) != str(chattering_scheme("certified")):
-        texts["chattering"] = str(response.chattering)
-    settings = response.solution.trail.settings
-    if not settings["no_end_time"]:
-        texts["duration"] = repr(float(settings["stop_time"]))
-    rotation, velocity = float(response.rotation(0.0)), float(response.angular_velocity(0.0))
-    if rotation or velocity:
-        texts |= {"initial_rotation": repr(rotation), "initial_velocity": repr(velocity)}
-    return texts
 
 
 def block_to_texts(block: Block) -> dict[str, str]:

@@ -113,7 +113,7 @@ def _read_unscaled(name: str, values: Values, uploads: UploadStore) -> WrittenMo
         name = "".join(letter for letter in motion.name if letter.isprintable())  # a line break would end the comment
         variable = f"given_{key[:6]}"
         return WrittenMotion(
-            motion, variable, (), f"{variable} = ...  # {name}: the motion that this page was opened with\n"
+            motion, variable, (), f"{variable} = ...  # {name}: a motion of the study\n"
         )
     if kind == "file":
         return _read_file(key, values, values.get("channel"), uploads)

@@ -14,12 +14,10 @@ from typing import Any, Final, TypeVar
 import anyio
 import anyio.to_thread
 from starlette.applications import Starlette
-from starlette.datastructures import MutableHeaders
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from rocking.core.tables import to_plain
 from rocking.errors import RockingError
@@ -39,25 +37,25 @@ EXCHANGE: Final = "/api/secret"
 _MAX_LINKS: Final = 100
 
 _BINARY: Final = "application/octet-stream"
-_HEADERS: Final = {"x-content-type-options": "nosniff", "referrer-policy": "no-referrer", "cache-control": "no-store"}
 
-#: Headers of the page's own files, of which some are templates: those neither run nor appear in frames.
-_FILE_HEADERS: Final = {
-    "cache-control": "no-cache",
-    "content-security-policy": "script-src 'none'; frame-ancestors 'none'",
-}
+#: Policies of both pages.
+_BLOCK_POLICY: Final = "frame-ancestors 'none'"
+_POLICY: Final = (
+    "default-src 'none'; script-src 'self'; connect-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    f"base-uri 'none'; form-action 'none'; {_BLOCK_POLICY}"
+)
 
 #: Folder of the page's own files.
 FOLDER: Final = Path(__file__).with_name("page")
 
 _LINK_REQUIRED: Final = (
     "this page requires the link that rocking explore printed, which opens once; open it, or start rocking explore "
-    "again; in a notebook, run the cell again"
+    "again"
 )
 
 
 class App:
-    """Application; ``framed_by`` contains the pages that may frame it.
+    """Application that answers requests by an explorer.
 
     The page and its files are the same for all users, and public. Every other request must carry the secret in its
     Authorization header. A link contains a token behind ``#``, a part that browsers never send. The page exchanges the
@@ -65,17 +63,12 @@ class App:
     it. Pages of other origins can neither read it nor send this header without permission, which is never granted.
     """
 
-    def __init__(self, explorer: Explorer, framed_by: str = "'none'") -> None:
+    def __init__(self, explorer: Explorer) -> None:
         self.explorer = explorer
         self._secret, self._tokens = secrets.token_urlsafe(32), list[str]()
         self._html = fill_page(FOLDER.joinpath("index.html").read_text("utf-8"), load_english_texts())
-        self._frames = f"frame-ancestors {framed_by}"
-        self._policy = (
-            "default-src 'none'; script-src 'self'; connect-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
-            f"base-uri 'none'; form-action 'none'; {self._frames}"
-        )
         self._threads, self._streams = anyio.CapacityLimiter(4), anyio.CapacityLimiter(2)
-        starlette = Starlette(
+        self.asgi = Starlette(
             routes=[
                 Route("/", self._send_page),
                 Route("/block", self._send_block),
@@ -86,8 +79,7 @@ class App:
             ],
             exception_handlers={RockingError: _respond_invalid, Exception: _respond_failure},
         )
-        starlette.router.redirect_slashes = False
-        self.asgi = _Headers(starlette)
+        self.asgi.router.redirect_slashes = False
 
     def new_token(self) -> str:
         """Return a token that opens the page once."""
@@ -95,12 +87,12 @@ class App:
         return self._tokens[-1]
 
     async def _send_page(self, _: Request) -> Response:
-        return HTMLResponse(self._html, headers={"content-security-policy": self._policy})
+        return HTMLResponse(self._html, headers={"content-security-policy": _POLICY})
 
     async def _send_block(self, _: Request) -> Response:
         """Return the standalone page, which leads to this one."""
         html = await self._run_in_thread(_build_block_page)
-        return HTMLResponse(html, headers={"content-security-policy": self._frames})
+        return HTMLResponse(html, headers={"content-security-policy": _BLOCK_POLICY})
 
     async def _exchange(self, request: Request) -> Response:
         """Return the secret for an unused token."""
@@ -152,8 +144,8 @@ class App:
         """Store the body of a request as a file, and describe it."""
         if not _carries(request, self._secret):
             return _respond_problem(_LINK_REQUIRED, 403)
-        length, data = request.headers.get("content-length", "0"), bytearray()
-        if not length.isdecimal() or int(length) > MAX_FILE_SIZE:
+        data = bytearray()
+        if int(request.headers.get("content-length", 0)) > MAX_FILE_SIZE:  # a number: uvicorn accepts nothing else
             return _respond_problem(TOO_LARGE, 413)
         try:
             async for chunk in request.stream():
@@ -168,29 +160,11 @@ class App:
 
 
 class _PageFiles(StaticFiles):
-    """Files of the page; some versions of Starlette fail at a path with a zero byte."""
+    """Files of the page except its templates; some versions of Starlette fail at a path with a zero byte."""
 
     def lookup_path(self, path: str) -> tuple[str, os.stat_result | None]:
         """Return the path of a file and its status, None if there is no such file."""
-        return (path, None) if "\0" in path else super().lookup_path(path)
-
-
-class _Headers:
-    """Application that adds headers to every response of another one."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request."""
-
-        async def send_headers(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                is_file = scope["path"].startswith("/page/")
-                MutableHeaders(scope=message).update(_HEADERS | (_FILE_HEADERS if is_file else {}))
-            await send(message)
-
-        await self.app(scope, receive, send_headers)
+        return ("", None) if path.endswith(".html") or "\0" in path else super().lookup_path(path)
 
 
 @cache

@@ -155,7 +155,7 @@ class UploadStore:
     def motion(self, key: str) -> Motion:
         """Return a motion of the program."""
         if key not in self._motions:
-            raise RecordError("{} is a motion of another program: open the page from there again", "motion")
+            raise RecordError("{} is a motion of a study that is not open: choose a point of its map again", "motion")
         return self._motions[key]
 
     def file(self, key: str, argument: str = "motion") -> Upload:

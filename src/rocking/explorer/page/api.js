@@ -15,7 +15,7 @@ export class Problem extends Error {
   }
 }
 
-/** The secret that this origin has stored. A frame may have no storage: then the page keeps the secret until it is closed. */
+/** The secret that this origin has stored. A browser may refuse it: then the page keeps the secret until it is closed. */
 function stored() {
   try { return localStorage.getItem(KEPT) ?? secret; } catch { return secret; }
 }

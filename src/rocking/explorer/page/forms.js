@@ -216,7 +216,7 @@ export class MotionForm {
     const rows = (/** @type {boolean} */ own) => this.list.groups.filter(({rows: [first]}) => Boolean(first.key) === own).flatMap((each) => each.rows).map((row) => [idOf(row.texts), row.title]);
     const mine = rows(true);
     this.motion.select.replaceChildren(
-      group("Other", [["none#", "nothing: released from a rotation"], ...(family === "given" ? [[`${motion}#`, "the motion of the notebook"]] : [])]),
+      group("Other", [["none#", "nothing: released from a rotation"], ...(family === "given" ? [[`${motion}#`, "the motion of the study"]] : [])]),
       group("Pulses", Object.keys(specification.pulses).map((name) => [`pulse:${name}`, phrase(`pulse.${name}`)])), ...(mine.length ? [group("Your files", mine)] : []), group("Shipped records", rows(false)));
     choose(this.motion.select, isPulse ? `pulse:${family}` : idOf(texts));
     if (isPulse) this.showPulse(family, Object.fromEntries(rest.split(",").map((part) => part.split("=").map((each) => each.trim()))));
