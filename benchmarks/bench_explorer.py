@@ -14,7 +14,7 @@ from urllib.parse import parse_qsl, urlsplit
 import httpx
 
 from rocking.explorer.core import Explorer
-from rocking.explorer.launch import start_listening
+from rocking.explorer.launch import Server
 from rocking.explorer.server import EXCHANGE
 
 CASE = "width=0.24&height=1.1&motion=ridgecrest-clc-090&pga=0.4g"
@@ -45,13 +45,13 @@ def main():
     if shutil.which("chromium") is None:
         print("no browser: install Chromium")
         return
-    here = start_listening(Explorer())
+    here = Server(Explorer())
     here.run_in_background()
     flags = ["--disable-gpu", "--disable-background-networking", *(["--no-sandbox"] if os.geteuid() == 0 else [])]
     with sync_playwright() as player:
         browser = player.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
         page = browser.new_page(viewport={"width": 1280, "height": 900})
-        page.goto(here.link(dict(parse_qsl(CASE))))
+        page.goto(here.create_link(dict(parse_qsl(CASE))))
         wait(page, "document.body.dataset.rested")
         ready = []
         for _ in range(5):
@@ -61,7 +61,7 @@ def main():
         print(f"page ready: {statistics.median(ready):.0f} ms (median of 5)")
         report("slider to drawn response, 320 s record", page.evaluate(SLIDE, 60))
         mapped = browser.new_page(viewport={"width": 1280, "height": 900})
-        mapped.goto(here.link(dict(parse_qsl(SINE))))
+        mapped.goto(here.create_link(dict(parse_qsl(SINE))))
         wait(mapped, "document.body.dataset.first")
         report("  while a map is computed", page.evaluate(SLIDE, 40))
         if mapped.evaluate("document.body.dataset.map") == "complete":
@@ -72,7 +72,7 @@ def main():
         first, whole = mapped.evaluate(MAP)
         print(f"map of 200 x 200 points: first picture {first:.0f} ms, complete {1e-3 * whole:.1f} s")
         took = time.process_time()
-        mapped.goto(here.link(dict(parse_qsl(f"view=map&{CASE}"))))
+        mapped.goto(here.create_link(dict(parse_qsl(f"view=map&{CASE}"))))
         wait(mapped, "document.body.dataset.map === 'complete'")
         first, whole = mapped.evaluate(MAP)
         took = time.process_time() - took
@@ -89,7 +89,7 @@ def server_alone(here):
     took = []
     base = f"http://127.0.0.1:{here.port}"
     with httpx.Client(base_url=base, headers={"origin": base}, timeout=60) as client:
-        token = urlsplit(here.link()).fragment.removeprefix("token=")
+        token = urlsplit(here.create_link()).fragment.removeprefix("token=")
         answer = client.post(EXCHANGE, headers={"authorization": f"Bearer {token}"}).raise_for_status()
         client.headers["authorization"] = f"Bearer {answer.text}"
         for k in range(50):

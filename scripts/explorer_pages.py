@@ -18,7 +18,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from rocking.explorer.core import Explorer
-from rocking.explorer.launch import start_listening
+from rocking.explorer.launch import Server
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "_static"
 
@@ -35,7 +35,7 @@ COLOURS = 96
 def main() -> None:
     """Take all pictures, or those of the views that are named."""
     wanted = sys.argv[1:] or [*VIEWS]
-    here = start_listening(Explorer())
+    here = Server(Explorer())
     here.run_in_background()
     flags = ["--disable-gpu", "--disable-background-networking", *(["--no-sandbox"] if os.geteuid() == 0 else [])]
     with sync_playwright() as player:
@@ -43,7 +43,7 @@ def main() -> None:
         page = browser.new_page(viewport={"width": 1280, "height": 1000})
         for view in wanted:
             query, ready = VIEWS[view]
-            page.goto(here.link(dict(parse_qsl(query))))
+            page.goto(here.create_link(dict(parse_qsl(query))))
             while not page.evaluate(f"Boolean(document.body.dataset.{ready})"):
                 time.sleep(0.05)
             page.wait_for_timeout(700)

@@ -55,8 +55,8 @@ def test_the_page_shows_what_its_script_computes(case, texts, tmp_path, monkeypa
 
 def test_components_of_one_station_count_together():
     two = "motion=el-centro-meloland-270;motion=el-centro-meloland-360;motion=ridgecrest-clc-360"
-    assert "clusters=[0, 0, 1]" in assessed(STATUE, records=two, **LEVELS).python
-    assert "clusters" not in assessed(STATUE, records=PLAIN, **LEVELS).python
+    assert "clusters=[0, 0, 1]" in assessed(STATUE, records=two, **LEVELS).script
+    assert "clusters" not in assessed(STATUE, records=PLAIN, **LEVELS).script
 
 
 def test_a_record_that_cannot_be_used_does_not_stop_the_others():
@@ -69,10 +69,10 @@ def test_a_record_that_cannot_be_used_does_not_stop_the_others():
 def test_the_report_and_the_numbers_are_exported():
     explorer = Explorer()
     query = {**STATUE, "records": PLAIN, **LEVELS}
-    explorer.answer("assessment", Query(query))
-    report = explorer.answer("export", Query({**query, "form": "report.html"})).decode()
+    explorer.answers["assessment"](Query(query))
+    report = explorer.answers["export"](Query({**query, "form": "report.html"})).decode()
     assert "<h2>1. block</h2>" in report and "Half of the motions overturn it" in report
-    assert explorer.answer("export", Query({**query, "form": "assessment.nc"})).startswith(b"\x89HDF")
+    assert explorer.answers["export"](Query({**query, "form": "assessment.nc"})).startswith(b"\x89HDF")
     assert {"report.html", "assessment.nc"} <= {*EXPORTS}
 
 

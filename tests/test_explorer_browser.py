@@ -26,7 +26,7 @@ import rocking
 from rocking.explorer import maps
 from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import read_case
-from rocking.explorer.launch import start_listening
+from rocking.explorer.launch import Server
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import UploadStore
 
@@ -62,7 +62,7 @@ def explorer():
 
 @pytest.fixture(scope="module")
 def here(explorer):
-    running = start_listening(explorer)
+    running = Server(explorer)
     running.run_in_background()
     yield running
     running.server.should_exit = True
@@ -77,7 +77,7 @@ def opened(browser, here):
         context = browser.new_context(viewport=viewport, color_scheme=scheme, **options)
         page = Watched(slowed(context.new_page()), allowed)
         pages.append((page, server, context))
-        page.page.goto(server.link(dict(parse_qsl(query))))
+        page.page.goto(server.create_link(dict(parse_qsl(query))))
         page.until(READY, "the page is ready")
         return page
 
@@ -387,7 +387,7 @@ def test_several_files_are_listed_assessed_and_removed(opened, explorer):
     page.page.fill("#search", "")
     page.page.locator("#records button.link", has_text="China Lake, 360").click()
     page.until("document.body.dataset.view === 'shake' && location.search.includes('ridgecrest-clc-360')")
-    assert explorer.uploads.usage()["files"] >= 1
+    assert explorer.uploads.count_usage()["files"] >= 1
 
 
 def test_a_mesh_is_dropped_turned_and_drawn(opened):
@@ -531,7 +531,7 @@ def test_a_study_opens_as_a_map(opened, tmp_path):
         tmp_path / "museum", blocks, rocking.pulses.one_sine(1.0, 1.0), levels=[2.0, 4.0], measure="pga"
     )
     study.run()
-    server = start_listening(Explorer({"view": "map"}, StudyView(tmp_path / "museum")))
+    server = Server(Explorer({"view": "map"}, StudyView(tmp_path / "museum")))
     server.run_in_background()
     page = opened(server=server)
     page.until(COMPUTED["map"])
@@ -712,7 +712,7 @@ def notebook(html):
 def test_another_tab_has_the_secret_and_other_origins_have_nothing(browser, here):
     context = browser.new_context(viewport=DESK)
     first = Watched(context.new_page(), allowed=["CORS", "Failed to load", "403", "frame"])
-    first.page.goto(here.link({"width": "0.3", "height": "1.2"}))
+    first.page.goto(here.create_link({"width": "0.3", "height": "1.2"}))
     first.until(READY)
     address, secret = first.page.url, first.js("localStorage.getItem('rocking-secret')")
     assert len(secret) > 40 and "#" not in address and secret not in address
@@ -732,18 +732,18 @@ def test_another_tab_has_the_secret_and_other_origins_have_nothing(browser, here
 
 
 def test_an_open_tab_goes_on_after_a_restart_once_its_new_link_was_opened(browser):
-    first = start_listening(Explorer())
+    first = Server(Explorer())
     first.run_in_background()
     context = browser.new_context(viewport=DESK)
     page = Watched(context.new_page(), allowed=["403", "ERR_CONNECTION", "net::"])
-    page.page.goto(first.link())
+    page.page.goto(first.create_link())
     page.until(READY)
     port = first.port
     first.server.should_exit = True
     first.server.force_exit = True
     for _ in range(200):
         try:
-            second = start_listening(Explorer(), port=port)
+            second = Server(Explorer(), port=port)
             break
         except rocking.RockingError:
             page.page.wait_for_timeout(50)
@@ -751,7 +751,7 @@ def test_an_open_tab_goes_on_after_a_restart_once_its_new_link_was_opened(browse
     fill(page, "pga", "0.5g")
     page.until("!document.getElementById('problem').hidden")
     other = Watched(context.new_page())
-    other.page.goto(second.link())
+    other.page.goto(second.create_link())
     other.until(READY)
     page.rested(lambda: fill(page, "pga", "0.1g"))
     assert page.text("#verdict").startswith("It does not move") and page.page.locator("#problem").is_hidden()

@@ -153,7 +153,7 @@ def test_motions_of_the_program_are_told_apart_by_everything_that_is_theirs():
     motions = [sine, sine * 1.5, rocking.pulses.one_sine(2.0, 1.1), *map(sine.with_vertical, (sine, sine * 0.5))]
     keys = [store.add_motion(each) for each in motions]
     assert len({*keys}) == len(motions)
-    assert [store.motion(key) for key in keys] == motions
+    assert [store.get_motion(key) for key in keys] == motions
 
 
 @pytest.mark.parametrize(
@@ -190,10 +190,10 @@ def test_a_file_that_finds_no_room_is_refused_until_one_is_taken_out(monkeypatch
     store.describe_file(keys[0])
     store.read(keys[0], dt=0.01, units="g")
     store.remove(keys[0])
-    assert store.usage()["files"] == 2
+    assert store.count_usage()["files"] == 2
     with pytest.raises(RecordError, match="not here any more"):
-        store.file(keys[0])
-    monkeypatch.setattr(uploads, "MAX_BYTES", store.usage()["bytes"] + 10)
+        store.get_file(keys[0])
+    monkeypatch.setattr(uploads, "MAX_BYTES", store.count_usage()["bytes"] + 10)
     with pytest.raises(RecordError, match="cannot be kept"):
         store.add_file("4.txt", samples(4).encode())
 
@@ -201,7 +201,7 @@ def test_a_file_that_finds_no_room_is_refused_until_one_is_taken_out(monkeypatch
 def test_new_files_take_none_out_and_of_what_was_read_what_was_used_longest_ago_goes_first(monkeypatch):
     """A motion that is asked for again stays, though it was read first; what goes is read anew from its file."""
     count = 100
-    monkeypatch.setattr(uploads, "MAX_CACHED_SAMPLES", 3 * count)
+    monkeypatch.setattr(uploads, "_MAX_MOTIONS", 3)
     store = UploadStore()
     keys = [store.add_file(f"{seed}.txt", samples(seed, count).encode()) for seed in range(5)]
     assert store.list_records() == tuple(keys)
@@ -227,7 +227,10 @@ def test_a_corrected_record_is_listed_and_read_as_corrected():
     assert row["texts"] == {"motion": f"file:{key}", "units": "g", "baseline": "1"}
     assert row["measures"]["pga"] < 1e-9 < plain["measures"]["pga"] == pytest.approx(0.899 * 9.80665)
     read = read_motion(row["texts"], store)
-    assert read.motion.pga == row["measures"]["pga"] and read.python == "rocking.read('a.csv', units='g', baseline='1')"
+    assert (
+        read.motion.pga == row["measures"]["pga"]
+        and read.expression == "rocking.read('a.csv', units='g', baseline='1')"
+    )
     (wrong,) = groups_of(store, [{**given, "baseline": "much"}])
     assert "“Baseline, degree” must be the degree" in wrong["reason"]
     assert wrong["rows"][0]["measures"] == plain["measures"]

@@ -22,7 +22,7 @@ from rocking.explorer.code import case_as_command, case_as_python, map_as_python
 from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import block_to_texts, read_case
 from rocking.explorer.motions import create_pulse, motion_to_texts
-from rocking.explorer.parameters import DEFAULT
+from rocking.explorer.parameters import DEFAULT, QUANTITIES
 from rocking.explorer.payload import pack
 from rocking.explorer.periodic import read_sweep
 from rocking.explorer.simulated import describe_outcome, thin_line
@@ -117,7 +117,9 @@ def test_an_answer_about_the_vertical_file_leaves_alone_what_the_horizontal_one_
     expected = rocking.read("knet.ns").with_vertical(rocking.Motion.from_samples(up, 0.02)).scaled(4.0)
     assert np.array_equal(case.motion.coefficients, expected.coefficients)
     assert np.array_equal(case.motion.vertical.coefficients, expected.vertical.coefficients)
-    assert case.motion_call.startswith("rocking.read('knet.ns').with_vertical(rocking.read('up.txt', dt=0.02, units=")
+    assert case.motion_expression.startswith(
+        "rocking.read('knet.ns').with_vertical(rocking.read('up.txt', dt=0.02, units="
+    )
     program, *arguments = shlex.split(case_as_command(case))
     code, out, _ = run(*arguments, "--json", "--quiet")
     assert (program, code) == ("rocking", 0)
@@ -193,8 +195,12 @@ def test_the_weight_on_moving_ground_says_when_the_block_is_lifted(explorer):
 @pytest.mark.parametrize(
     ("texts", "error", "words"),
     [
-        ({"width": "0.2"}, BlockError, "either width and height"),
-        ({**STATUE, "p": "3"}, BlockError, "either width and height"),
+        ({"width": "0.2"}, BlockError, "a block requires more than width; give width and height$"),
+        (
+            {**STATUE, "p": "3"},
+            BlockError,
+            "width and height and p are from different descriptions of a block; give only width and height, or p",
+        ),
         ({**STATUE, "width": "wide"}, OptionError, "width must be a length"),
         ({**STATUE, "width": "-1"}, BlockError, "positive"),
         ({**STATUE, "width": "nan"}, BlockError, "positive"),
@@ -209,9 +215,13 @@ def test_the_weight_on_moving_ground_says_when_the_block_is_lifted(explorer):
         ({**STATUE, "restitution": "0.9999"}, OptionError, "hardly comes to rest"),
         ({**STATUE, "chattering": "never"}, OptionError, "chattering must be one of"),
         ({**STATUE, "model": "x" * 400}, OptionError, "at most 300"),
-        ({"width": "0.3", "height": "1", "p": "2"}, BlockError, "a block has either width and height"),
-        ({"pivots": "0.2,0.1", "gyration": "0.4"}, BlockError, "a block has either width and height"),
-        ({"p": "2", "alpha": "0.2", "offset": "0.1"}, BlockError, "a block has either width and height"),
+        (
+            {"motion": "none"},
+            BlockError,
+            "a block is required; give width and height, or p and .*, or mesh and azimuth$",
+        ),
+        ({"pivots": "0.2,0.1", "gyration": "0.4"}, BlockError, "more than pivots and gyration; give"),
+        ({"p": "2", "alpha": "0.2", "offset": "0.1"}, BlockError, "from different descriptions"),
     ],
 )
 def test_an_impossible_case_is_refused_with_one_sentence(texts, error, words):
@@ -296,9 +306,7 @@ def test_code_names_a_motion_of_the_program_on_a_line_of_its_own(tmp_path):
     case = read_case(texts, uploads)
     grid = maps.read_grid(case, {"x": "p", "y": "pga", "points": "8"})
     for code, peak in ((case_as_python(case), 3.0), *[(map_as_python(grid), None)]):
-        (line,) = [
-            line for line in code.splitlines() if "# mymotion: a motion of the study" in line
-        ]
+        (line,) = [line for line in code.splitlines() if "# mymotion: a motion of the study" in line]
         variable = line.partition(" = ...")[0]
         script = tmp_path / "code.py"
         script.write_text(code.replace(line, f"from rocking_given import motion as {variable}"), "utf-8")
@@ -315,7 +323,9 @@ SIMULATED = {
     "two-sided": (rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4), rocking.pulses.one_sine(4.0, 1.0)),
     "off its middle": (rocking.Block(width=0.3, height=1.1, offset=0.03), rocking.pulses.one_sine(4.0, 1.0)),
     "moon": (rocking.Block(width=0.24, height=1.1, gravity=1.62), rocking.pulses.one_sine(2.0, 1.0)),
-    "own motion": (rocking.Block.from_parameters(2.0, 0.2), rocking.pulses.one_sine(4.0, 1.0) + rocking.pulses.ricker(1.0, 2.0)),
+    "own motion": (
+        rocking.Block.from_parameters(2.0, 0.2), rocking.pulses.one_sine(4.0, 1.0) + rocking.pulses.ricker(1.0, 2.0)
+    ),
     "processed": (
         rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090").processed(trim=(200.0, 250.0))
     ),
@@ -491,7 +501,7 @@ def test_files_are_known_by_name_and_content_and_so_many_at_most():
     key = uploads.add_file("a.txt", b"1 2 3")
     assert uploads.add_file("/data/a.txt", b"1 2 3") == key
     other = uploads.add_file("123", b"1 2 3")
-    assert other != key and [uploads.file(each).name for each in (key, other)] == ["a.txt", "123"]
+    assert other != key and [uploads.get_file(each).name for each in (key, other)] == ["a.txt", "123"]
     uploads.remove(other)
     for k in range(MAX_FILES - 1):
         uploads.add_file("x", str(k).encode())
@@ -512,14 +522,14 @@ def test_no_folder_is_left_of_a_files_name(name):
 
 def filled(grid):
     """Every quantity at every point of a map, each point once."""
-    values = np.full((len(maps.QUANTITIES), grid.shape[0] * grid.shape[1]), -9.0)
+    values = np.full((len(QUANTITIES), grid.shape[0] * grid.shape[1]), -9.0)
     count = np.zeros(values.shape[1], int)
     for part in maps.simulate_grid(grid):
         points = part.arrays["points"].astype(int)
-        values[:, points] = [part.arrays[name] for name in maps.QUANTITIES]
+        values[:, points] = [part.arrays[name] for name in QUANTITIES]
         count[points] += 1
     assert (count == 1).all()
-    return dict(zip(maps.QUANTITIES, values.reshape(len(values), *grid.shape), strict=True))
+    return dict(zip(QUANTITIES, values.reshape(len(values), *grid.shape), strict=True))
 
 
 def _mapped(texts, axes):
@@ -781,7 +791,7 @@ def test_a_slice_of_a_study_is_its_results(study):
         "polarity_index": "1",
         "restitution_index": "1",
     }
-    payload = study.slice(texts)
+    payload = study.select(texts)
     rows, columns = payload.header["shape"]
     values = payload.arrays["values"].reshape(rows, columns)
     for row in range(rows):
@@ -804,7 +814,7 @@ def test_a_verdict_that_the_duration_left_open_is_not_drawn_as_standing(tmp_path
     results = made.results()
     assert results.ended_early.values.any()
     view = StudyView(tmp_path / "cut")
-    drawn = view.slice({"x": "p", "y": "scale", "quantity": "overturned"}).arrays["values"].reshape(2, 2)
+    drawn = view.select({"x": "p", "y": "scale", "quantity": "overturned"}).arrays["values"].reshape(2, 2)
     chosen = results.isel(motion=0, block=np.flatnonzero(results.alpha.values == 0.1))
     wanted = np.where(chosen.ended_early & ~chosen.overturned, -1.0, chosen.overturned)
     assert np.array_equal(drawn, wanted.reshape(2, 2))
@@ -838,7 +848,7 @@ def test_levels_of_a_study_are_an_axis_in_increasing_order(tmp_path):
     blocks, levels = rocking.Blocks.grid(p=[2.0, 3.0], alpha=[0.2], restitution=[0.9]), [3.0, 1.0, 2.0]
     made = rocking.create_study(tmp_path / "any", blocks, rocking.pulses.one_sine(2.2, 2.0), levels=levels)
     made.run()
-    found = StudyView(tmp_path / "any").slice({"x": "p", "y": "scale", "quantity": "peak_rotation"})
+    found = StudyView(tmp_path / "any").select({"x": "p", "y": "scale", "quantity": "peak_rotation"})
     assert found.header["y"]["values"] == [1.0, 2.0, 3.0]
     peaks = made.results().peak_rotation.transpose("scale", "motion", "block").values[[1, 2, 0], 0]
     assert np.array_equal(found.arrays["values"].reshape(3, 2), peaks) and len(np.unique(peaks)) > 3
@@ -887,10 +897,10 @@ def test_a_study_of_a_list_of_blocks_is_a_map_over_their_numbers(tmp_path):
     view = StudyView(tmp_path / "list")
     assert list(view.axes) == ["block", "scale", "motion", "polarity"]
     results = made.results()
-    over_scales = view.slice({"x": "block", "y": "scale", "quantity": "peak_rotation", "motion_index": "1"})
+    over_scales = view.select({"x": "block", "y": "scale", "quantity": "peak_rotation", "motion_index": "1"})
     expected = results.peak_rotation.isel(motion=1).transpose("scale", "block", ...).values.reshape(3, 3)
     assert np.array_equal(over_scales.arrays["values"].reshape(3, 3), expected)
-    over_motions = view.slice({"x": "motion", "y": "block", "quantity": "peak_rotation", "scale_index": "2"})
+    over_motions = view.select({"x": "motion", "y": "block", "quantity": "peak_rotation", "scale_index": "2"})
     expected = results.peak_rotation.isel(scale=2).transpose("block", "motion", ...).values.reshape(3, 2)
     assert np.array_equal(over_motions.arrays["values"].reshape(3, 2), expected)
     uploads = UploadStore()
@@ -920,7 +930,7 @@ def test_a_study_that_varies_too_little_is_refused_with_a_sentence(tmp_path):
 )
 def test_a_slice_that_is_none_is_refused(study, texts):
     with pytest.raises(OptionError):
-        study.slice(texts)
+        study.select(texts)
 
 
 def test_a_slice_of_more_points_than_a_map_may_have_is_refused(study, monkeypatch):
@@ -929,10 +939,10 @@ def test_a_slice_of_more_points_than_a_map_may_have_is_refused(study, monkeypatc
     for most, fits in ((size, True), (size - 1, False)):
         monkeypatch.setattr("rocking.explorer.studies._MAX_POINTS", most)
         if fits:
-            assert study.slice({"x": "p", "y": "alpha"}).arrays
+            assert study.select({"x": "p", "y": "alpha"}).arrays
         else:
             with pytest.raises(OptionError, match="points are too many for a map"):
-                study.slice({"x": "p", "y": "alpha"})
+                study.select({"x": "p", "y": "alpha"})
 
 
 @pytest.mark.parametrize(

@@ -147,7 +147,7 @@ def test_a_mesh_that_is_refused_is_not_kept():
     explorer = Explorer()
     with pytest.raises(BlockError):
         explorer.add_file("flat.stl", content(trimesh.creation.box((1.0, 1.0, 1e-9))))
-    assert explorer.uploads.usage()["files"] == 0
+    assert explorer.uploads.count_usage()["files"] == 0
 
 
 def gltf(**changed):
@@ -252,7 +252,7 @@ def test_what_reads_meshes_may_be_missing(monkeypatch):
 def page():
     with clients() as portal:
         app = App(Explorer())
-        yield let_in(Client(portal, app.asgi, "http://127.0.0.1:8123"), app.new_token())
+        yield let_in(Client(portal, app.asgi, "http://127.0.0.1:8123"), app.create_token())
 
 
 def test_the_server_takes_a_mesh_and_shows_it(page):

@@ -68,7 +68,8 @@ def test_the_page_reads_every_unit_as_the_program_does():
     for parameter in (*PARAMETERS.values(), *(each for pulse in PULSES.values() for each in pulse["parameters"])):
         described = parameter.describe()
         kind = "acceleration" if parameter.name == "sa" else parameter.kind
-        if kind == "text":
+        if kind in ("text", "densities", "length unit"):
+            assert described["units"] == {}
             continue
         read = getattr(quantities, f"read_{kind}")
         suffix = described["suffix"] or ("" if parameter.unit != "Hz" else "Hz")

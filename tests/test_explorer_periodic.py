@@ -226,7 +226,7 @@ def test_the_case_at_a_point_of_a_sweep_settles_on_that_point(name, texts):
         assert header["at"][name] == pytest.approx(value, rel=1e-12)
         assert header["period"] == each.period
         again = read_sweep(opened, {"sweep": name})
-        assert again.sine_at(1.0).text.partition("cycles")[0] == sweep.sine_at(1.0).text.partition("cycles")[0]
+        assert again.choose_sine(1.0)[:3] == sweep.choose_sine(1.0)[:3]
         judged += 1
     assert judged >= 10
     assert "initial_rotation" not in sweep_point_to_texts(sweep, 2.0)

@@ -28,7 +28,7 @@ from rocking.errors import OptionError, RockingError, StudyError
 from rocking.explorer import launch, server, uploads
 from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import read_case
-from rocking.explorer.launch import start_listening
+from rocking.explorer.launch import Server
 from rocking.explorer.server import EXCHANGE, App
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import MAX_FILE_SIZE, UploadStore
@@ -50,7 +50,7 @@ def opened():
     with clients() as portal:
 
         def open_page(app):
-            return let_in(Client(portal, app.asgi, OURS), app.new_token())
+            return let_in(Client(portal, app.asgi, OURS), app.create_token())
 
         yield open_page
 
@@ -212,9 +212,7 @@ def test_the_secret_is_given_once_and_required(explorer):
     app = App(explorer)
     with clients() as portal:
         stranger = Client(portal, app.asgi, OURS)
-        paths = [
-            route.path for route in app.asgi.routes if route.path.startswith("/api/") and route.path != EXCHANGE
-        ]
+        paths = [route.path for route in app.asgi.routes if route.path.startswith("/api/") and route.path != EXCHANGE]
         assert len(paths) >= 15
         for path in paths:
             for headers in ({}, bearing("x"), bearing(""), {"authorization": app._secret}):
@@ -222,7 +220,7 @@ def test_the_secret_is_given_once_and_required(explorer):
                 assert answer.status_code == 403, path
                 assert app._secret not in answer.text
         assert stranger.post(EXCHANGE, headers=bearing("x")).status_code == 403
-        token = app.new_token()
+        token = app.create_token()
         answer = stranger.post(EXCHANGE, headers=bearing(token))
         assert (answer.status_code, answer.text) == (200, app._secret)
         assert stranger.post(EXCHANGE, headers=bearing(token)).status_code == 403
@@ -230,9 +228,9 @@ def test_the_secret_is_given_once_and_required(explorer):
         assert stranger.get("/api/start", params={"authorization": app._secret}).status_code == 403
         assert not stranger.get("/").headers.get("set-cookie")
         assert "access-control-allow-origin" not in stranger.get("/api/start", headers={"origin": OURS}).headers
-        first = app.new_token()
+        first = app.create_token()
         for _ in range(200):
-            app.new_token()
+            app.create_token()
         assert stranger.post(EXCHANGE, headers=bearing(first)).status_code == 403
 
 
@@ -282,7 +280,7 @@ def test_an_error_names_the_field_by_its_label_and_the_argument_that_is_wrong(pa
 
 
 def test_what_went_wrong_inside_says_nothing_of_the_inside(page, explorer, monkeypatch):
-    monkeypatch.setitem(explorer._answers, "details", lambda query: 1 / 0)
+    monkeypatch.setitem(explorer.answers, "details", lambda query: 1 / 0)
     answer = page.get("/api/details", params=STATUE)
     assert answer.status_code == 500
     problem = "this could not be computed (ZeroDivisionError); please report it"
@@ -434,7 +432,7 @@ def test_twenty_clients_at_once_are_all_answered(page):
 
 @pytest.fixture(scope="module")
 def running():
-    here = start_listening(Explorer({"motion": "one-sine:amplitude=0.3g,frequency=1"}))
+    here = Server(Explorer({"motion": "one-sine:amplitude=0.3g,frequency=1"}))
     here.run_in_background()
     yield here
     here.server.should_exit = True
@@ -442,7 +440,7 @@ def running():
 
 @pytest.fixture(scope="module")
 def browser(running):
-    headers, _, _ = opened_by(running.link())
+    headers, _, _ = opened_by(running.create_link())
     with httpx.Client(headers=headers, timeout=60) as client:
         yield client
 
@@ -582,10 +580,10 @@ def test_a_missing_package_is_named(run, monkeypatch):
 
 
 def test_a_port_that_is_taken_is_said_so():
-    here = start_listening(Explorer())
+    here = Server(Explorer())
     try:
         with pytest.raises(OptionError, match="cannot be used"):
-            start_listening(Explorer(), port=here.port)
+            Server(Explorer(), port=here.port)
     finally:
         here.socket.close()
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import rocking
 from rocking.explorer import payload
-from rocking.explorer.parameters import ASSESSMENT, MAP, PARAMETERS, SWEEP, specification
+from rocking.explorer.parameters import ASSESSMENT_NAMES, MAP_NAMES, PARAMETERS, SWEEP_NAMES, specification
 
 FOLDER = Path(rocking.__file__).parent / "explorer"
 TEXTS = payload.load_english_texts()
@@ -21,7 +21,12 @@ def test_every_text_is_used():
 
 def test_every_parameter_has_its_text_and_no_text_is_of_none():
     described = specification()
-    fields = {each.text or each.name for each in PARAMETERS.values()} | {*MAP, *SWEEP, *ASSESSMENT, "at"} - {"quantity"}
+    fields = {each.text or each.name for each in PARAMETERS.values()} | {
+        *MAP_NAMES,
+        *SWEEP_NAMES,
+        *ASSESSMENT_NAMES,
+        "at",
+    } - {"quantity"}
     fields |= {each["text"] for pulse in described["pulses"].values() for each in pulse["parameters"]}
     fields |= {described["period"]["text"]}
     fields |= {each["limit"]["text"] for each in described["treatments"] if "limit" in each}

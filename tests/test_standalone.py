@@ -18,7 +18,7 @@ from rocking import pulses
 from rocking.errors import OptionError, RecordError
 from rocking.explorer import standalone
 from rocking.explorer.core import Explorer
-from rocking.explorer.launch import Server, start_listening
+from rocking.explorer.launch import Server
 from rocking.kernels import library, state
 from rocking.simulation.simulate import compute_response
 
@@ -171,11 +171,11 @@ def test_sines_rest_below_the_critical_amplitude(opened):
 
 @pytest.mark.browser
 def test_the_explorer_opens_on_the_page_and_both_share_the_case(built, browser):
-    server = start_listening(Explorer())
+    server = Server(Explorer())
     server.run_in_background()
     context = browser.new_context(viewport={"width": 1280, "height": 800})
     page = Watched(context.new_page())
-    page.page.goto(server.link(path="/block"))
+    page.page.goto(server.create_link(path="/block"))
     page.until("document.body.dataset.settled", "computed")
     page.until("!location.hash.includes('token')", "the token is redeemed")
     assert page.text("#question") == "Will it fall?" and page.page.locator("#ask").is_visible()

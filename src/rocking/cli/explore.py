@@ -41,10 +41,8 @@ def explore(
     no_open
         Do not open a browser.
     """
-    from rocking.explorer.launch import require_packages, start_listening
-
-    require_packages()
     from rocking.explorer.core import Explorer
+    from rocking.explorer.launch import Server
     from rocking.explorer.standalone import is_available
 
     explorer = Explorer()
@@ -52,7 +50,7 @@ def explore(
         explorer.opening, explorer.study = {"view": "map"}, _open_study(Path(motion))
     elif motion is not None:
         explorer.opening = _describe_initial_motion(explorer, motion)
-    server = start_listening(explorer, port=port)
+    server = Server(explorer, port=port)
     path = "/block" if motion is None and is_available() else "/"
     if motion is None and path == "/":
         note("the page of the block needs WebAssembly, which was not built with this installation; the explorer opens")

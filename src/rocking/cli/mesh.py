@@ -14,7 +14,7 @@ from rocking.core.progress import note
 from rocking.core.tables import format_table, write_csv
 from rocking.errors import OptionError
 from rocking.inputs.notes import list_block_notes
-from rocking.inputs.quantities import read_array, read_densities, read_length, read_number, read_sides
+from rocking.inputs.quantities import read_array, read_densities, read_length, read_length_unit, read_number, read_sides
 from rocking.solid.solid import Solid
 
 _Signed = Annotated[str | None, Parameter(allow_leading_hyphen=True)]
@@ -72,7 +72,7 @@ def mesh(
             support=None if support is None else [_read_numbers(corner, "support") for corner in support.split(";")],
             tolerance=None if tolerance is None else read_length(tolerance, "tolerance"),
             up=_read_numbers(up, "up") if up is not None and "," in up else up,
-            unit=unit if unit.isalpha() else read_number(unit, "unit"),
+            unit=read_length_unit(unit, "unit"),
             turn=0.0 if turn is None else read_number(turn, "turn"),
         )
         rose = solid.rose()

@@ -43,11 +43,11 @@ assessment.to_html("report.html")
 
 @dataclass(frozen=True, eq=False)
 class AssessedCase:
-    """Assessment of a case's block, the number of each of its records in the list, and equivalent Python code."""
+    """Assessment of a case's block, the number of each of its records in the list, and an equivalent Python script."""
 
     result: Assessment
     numbers: dict[str, int]  # by the name of the record
-    python: str
+    script: str
 
 
 def assess_case(case: Case, texts: Texts, uploads: UploadStore) -> AssessedCase:
@@ -61,22 +61,22 @@ def assess_case(case: Case, texts: Texts, uploads: UploadStore) -> AssessedCase:
         raise OptionError("an assessment needs {}: tick one or more in the list", "records")
     require_rest(side.restitution for side in case.block.sides)
     measure, levels = _read_measure(texts), _read_levels(texts)
-    read, numbers, failures = dict[str, WrittenMotion](), dict[str, int](), dict[str, str]()
+    written, numbers, failures = dict[str, WrittenMotion](), dict[str, int](), dict[str, str]()
     titles, stations = zip(*describe_entries(entries, uploads), strict=True)
     names = make_names_unique(titles)
     for number, (name, entry) in enumerate(zip(names, entries, strict=True)):
         try:
-            read[name], numbers[name] = read_motion(entry, uploads), number
+            written[name], numbers[name] = read_motion(entry, uploads), number
         except RockingError as error:
             failures[name] = str(error)
-    motions = {name: each.motion for name, each in read.items() if each.motion is not None}
+    motions = {name: record.motion for name, record in written.items() if record.motion is not None}
     clusters = [stations[numbers[name]] for name in motions]
     options = {name: value for name, value in case.options.items() if name in ("model", "friction", "chattering")}
     options |= {"clusters": clusters} if len({*clusters}) < len(clusters) else {}
     block = case.block.with_labels(name="block")
     result = assess(block, motions, measure=measure, levels=levels, polarity="both", **options)
     result = replace(result, skipped={**failures, **result.skipped})
-    return AssessedCase(result, numbers, _write_script(case, read, measure, levels, options))
+    return AssessedCase(result, numbers, _write_script(case, written, measure, levels, options))
 
 
 def _read_measure(texts: Texts) -> Measure:
@@ -101,9 +101,9 @@ def _write_script(
 ) -> str:
     """Write a complete script that computes the same assessment."""
     return _SCRIPT.format(
-        block=case.block_call,
+        block=case.block_expression,
         before="".join(dict.fromkeys(record.preamble for record in records.values())),
-        motions="\n".join(f"    {name!r}: {record.python}," for name, record in records.items()),
+        motions="\n".join(f"    {name!r}: {record.expression}," for name, record in records.items()),
         measure=repr(measure.name) if measure.period is None else f'rocking.Measure("sa", period={measure.period!r})',
         levels=levels if isinstance(levels, int) else f"np.linspace({levels[0]!s}, {levels[-1]!s}, {len(levels)})",
         options="".join(f", {name}={value!r}" for name, value in options.items()),
@@ -128,6 +128,6 @@ def describe_assessment(assessed: AssessedCase) -> Payload:
             {"number": assessed.numbers[name], "name": name, **{key: data[key].values[k].item() for key in names}}
             for k, name in enumerate(result.motions)
         ],
-        "python": assessed.python,
+        "python": assessed.script,
     }
     return Payload(header, {"levels": item.levels, "share": item.share.mean(axis=1), **curve})

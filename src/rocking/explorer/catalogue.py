@@ -77,7 +77,7 @@ def list_records(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[st
         title = ", ".join(first.origin) or (str(first.place[0]) if len(first.place) > 1 else "") or first.row["file"]
         reason = " ".join(problems[row["key"]] for row in rows if row["key"] in problems)
         groups.append({"title": title, "reason": reason, "rows": rows})
-    return {"groups": groups, "usage": uploads.usage()}
+    return {"groups": groups, "usage": uploads.count_usage()}
 
 
 def describe_entries(entries: list[dict[str, str]], uploads: UploadStore) -> list[tuple[str, int]]:
@@ -104,7 +104,7 @@ def _list_readable(uploads: UploadStore, key: str, answers: Texts, problems: dic
     except RockingError as error:
         if not answers:
             raise
-        problems[key] = ("" if error.path else f"{uploads.file(key).name}: ") + error.text(field_label)
+        problems[key] = ("" if error.path else f"{uploads.get_file(key).name}: ") + error.text(field_label)
         known = answers if error.argument in answers else {}
         return _list_readable(uploads, key, {n: text for n, text in known.items() if n != error.argument}, problems)
 

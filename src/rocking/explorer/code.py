@@ -7,11 +7,11 @@ from typing import Final
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.explorer.inputs import Case
 from rocking.explorer.maps import Axis, MapGrid, compute_angular_frequency
-from rocking.explorer.parameters import BLOCK_NAMES, NAMES
+from rocking.explorer.parameters import BLOCK_NAMES, PARAMETERS
 from rocking.explorer.periodic import RECORDED_PERIODS, SWEPT, TRANSIENT_PERIODS, Sweep
 from rocking.inputs.texts import format_command
 
-_CASE: Final = """\
+_CASE_SCRIPT: Final = """\
 import rocking
 
 block = rocking.{block}
@@ -19,34 +19,45 @@ block = rocking.{block}
 response = rocking.simulate(block, motion{options})
 print(response.summary())"""
 
-_MAP: Final = """\
+_MAP_SCRIPT: Final = """\
 import numpy as np
 
 import rocking
 from rocking.chattering import chattering_map, families
 
-{before}xs, ys = {xs}, {ys}
+{before}base = rocking.{block}
+xs, ys, model = {xs}, {ys}, {model!r}
 
 
 def case({y}, {x}):
-    block = rocking.{block}
-    return families.SimulationInput(block, {motion}, {model!r})
+    sides = {{name: np.array([getattr(side, name) for side in base.sides]) for name in ("p", "alpha", "restitution")}}
+{changes}    block = rocking.Block.from_parameters(**sides, gravity=base.gravity)
+    return families.SimulationInput(block, {motion}, model)
 
 
 found = chattering_map(case, {{"{y}": ys, "{x}": xs}})
 print(found.summary())
 
 
-def find_peak(at):
-    response = rocking.simulate(at.block, at.motion, model=at.model)
-    slenderness = min(side.alpha for side in at.block.sides)
-    return np.inf if response.overturned else response.peak_rotation / slenderness
+def find_peak(block, motion, _):
+    response = rocking.simulate(block, motion, model=model)
+    return np.inf if response.overturned else response.peak_rotation / min(side.alpha for side in block.sides)
 
 
-peaks = [[find_peak(case(y, x)) for x in xs] for y in ys]
+peaks = [[find_peak(*case(y, x)) for x in xs] for y in ys]
 """
 
-_SWEEP: Final = """\
+#: Lines that change the sides of a block, and factors on the motion, by the parameter of a map.
+_CHANGES: Final = {
+    "p": 'sides["p"] *= p / min(sides["p"])',
+    "omega": "# A pulse of another frequency is equivalent to a block of another p, in other units of time.\n"
+    '    sides["p"] *= {angular_frequency} / omega / min(sides["p"])',
+    "alpha": 'sides["alpha"] = np.radians(alpha)',
+    "restitution": 'sides["restitution"] = restitution',
+}
+_PEAKS: Final = {"a": "a * min(block.uplift_thresholds(model))", "pga": f"pga * {STANDARD_GRAVITY!r}"}
+
+_SWEEP_SCRIPT: Final = """\
 import numpy as np
 
 import rocking
@@ -84,8 +95,8 @@ def case_as_python(case: Case) -> str:
     print(response.summary())
     """
     options = "".join(f", {name}={value!r}" for name, value in case.options.items())
-    return _CASE.format(
-        block=case.block_call, before=case.motion_preamble, motion=case.motion_call, options=options
+    return _CASE_SCRIPT.format(
+        block=case.block_expression, before=case.motion_preamble, motion=case.motion_expression, options=options
     )  # fmt: skip
 
 
@@ -103,24 +114,30 @@ def case_as_command(case: Case) -> str | None:
     if not case.words or "gravity" in case.texts:
         return None
     excluded = {*BLOCK_NAMES, "motion", "vertical"}
-    options = {**case.block_options} | {name: case.texts[name] for name in NAMES if name in {*case.texts} - excluded}
+    options = {**case.block_options} | {
+        name: case.texts[name] for name in PARAMETERS if name in {*case.texts} - excluded
+    }
     return format_command(["rocking", "simulate", *case.words], options)
 
 
 def map_as_python(grid: MapGrid) -> str:
     """Write a complete script that computes a map."""
-    preamble = grid.case.motion_preamble
-    if "omega" in grid.names:
-        preamble += "# A pulse of another frequency is equivalent to a block of another p, in other units of time.\n"
-    return _MAP.format(
-        before=preamble,
-        x=grid.x.name,
-        y=grid.y.name,
+    case, names = grid.case, (grid.x.name, grid.y.name)
+    changes = [_CHANGES[name] for name in _CHANGES if name in names]
+    if "alpha" in names and "restitution" not in {*case.texts, *names}:
+        changes.append('del sides["restitution"]  # follows from alpha')
+    if "omega" in names:
+        changes = [change.replace("{angular_frequency}", repr(compute_angular_frequency(case))) for change in changes]
+    return _MAP_SCRIPT.format(
+        before=case.motion_preamble,
+        block=case.block_expression,
+        x=names[0],
+        y=names[1],
         xs=_write_axis(grid.x),
         ys=_write_axis(grid.y),
-        block=_write_block(grid),
-        motion=_write_motion(grid),
-        model=grid.case.model,
+        changes="".join(f"    {change}\n" for change in changes),
+        motion=case.motion_expression + "".join(f".scaled_to({_PEAKS[name]})" for name in names if name in _PEAKS),
+        model=case.model,
     )
 
 
@@ -129,9 +146,9 @@ def sweep_as_python(sweep: Sweep) -> str:
     case, sine, name = sweep.case, sweep.sine, sweep.axis.name
     options = {name: case.options[name] for name in ("model", "chattering") if name in case.options}
     numbers = {"amplitude": repr(sine.amplitude), "frequency": repr(sine.frequency)}
-    return _SWEEP.format(
+    return _SWEEP_SCRIPT.format(
         **numbers | {SWEPT[name]: f"{name} * {sweep.unit!r}"},
-        block=case.block_call,
+        block=case.block_expression,
         phase=sine.phase,
         options="".join(f", {option}={value!r}" for option, value in options.items()),
         name=name,
@@ -143,37 +160,3 @@ def sweep_as_python(sweep: Sweep) -> str:
 
 def _write_axis(axis: Axis) -> str:
     return f"np.linspace({float(axis.values[0])!r}, {float(axis.values[-1])!r}, {len(axis.values)})"
-
-
-def _write_block(grid: MapGrid) -> str:
-    """Return the call that creates the block, with the names of the axes as arguments."""
-    case, varied = grid.case, grid.names & {"omega", "p", "alpha", "restitution"}
-    if not varied:
-        return case.block_call
-    p = next(iter(varied & {"p", "omega"}), "")
-    if p == "omega":
-        p = f"{compute_angular_frequency(case)!r} / omega"
-    slowest = min(side.p for side in case.block.sides)
-    arguments = {
-        "p": _write_pair([f"{p} * {side.p / slowest!r}" if p else repr(side.p) for side in case.block.sides]),
-        "alpha": "np.radians(alpha)" if "alpha" in varied else _write_pair([repr(s.alpha) for s in case.block.sides]),
-    }
-    if "restitution" in varied:
-        arguments["restitution"] = "restitution"
-    elif "alpha" not in varied or "restitution" in case.texts:
-        arguments["restitution"] = _write_pair([repr(side.restitution) for side in case.block.sides])
-    if "gravity" in case.texts:
-        arguments["gravity"] = repr(case.block.gravity)
-    return f"Block.from_parameters({', '.join(f'{name}={value}' for name, value in arguments.items())})"
-
-
-def _write_pair(sides: list[str]) -> str:
-    numbers = [number.removesuffix(" * 1.0") for number in sides]
-    return numbers[0] if numbers[0] == numbers[1] else f"[{', '.join(numbers)}]"
-
-
-def _write_motion(grid: MapGrid) -> str:
-    """Return the call that creates the motion, with the names of the axes among its arguments."""
-    peaks = {"a": f"a * min(block.uplift_thresholds({grid.case.model!r}))", "pga": f"pga * {STANDARD_GRAVITY!r}"}
-    peak = next((peaks[name] for name in grid.names if name in peaks), "")
-    return f"{grid.case.motion_call}.scaled_to({peak})" if peak else grid.case.motion_call

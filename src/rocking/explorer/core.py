@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -16,18 +17,16 @@ from rocking.explorer.catalogue import list_records, read_entries
 from rocking.explorer.code import case_as_command, case_as_python, map_as_python, sweep_as_python
 from rocking.explorer.inputs import Case, read_case
 from rocking.explorer.meshes import describe_body
-from rocking.explorer.parameters import PARAMETERS, Texts, specification
+from rocking.explorer.parameters import ASSESSMENT_NAMES, PARAMETERS, Texts, specification
 from rocking.explorer.payload import Payload
 from rocking.explorer.simulated import SimulatedCase
 from rocking.explorer.standalone import is_available
 from rocking.explorer.studies import StudyView
-from rocking.explorer.uploads import RecentCache, UploadStore, is_mesh, list_units
+from rocking.explorer.uploads import UploadStore, is_mesh, list_units
 from rocking.inputs.quantities import read_number
 
-#: Number of stored responses, and maximum size of their steps and motions, some hundreds of MB; number of assessments.
-_MAX_RESPONSES: Final = 48
-_MAX_ROWS: Final = 2_000_000
-_MAX_ASSESSMENTS: Final = 8
+#: Maximum numbers of cached responses, of some MB and up to 100 MB for the longest records, and assessments.
+_MAX_RESPONSES, _MAX_ASSESSMENTS = 8, 8
 
 #: Tables of a response by the ending of their files, and other files of a case.
 _TABLES: Final[Mapping[str, Any]] = {"csv": "histories", "events.csv": "events", "impacts.csv": "impacts"}
@@ -47,10 +46,14 @@ class Query:
 
     fields: Texts
 
+    def select(self, names: Iterable[str]) -> dict[str, str]:
+        """Return the texts with these names that are not empty."""
+        return {name: self.fields[name] for name in names if self.fields.get(name)}
+
     @property
     def case(self) -> dict[str, str]:
         """Texts of the case."""
-        return {name: self.fields[name] for name in PARAMETERS if self.fields.get(name)}
+        return self.select(PARAMETERS)
 
     def get(self, name: str) -> str:
         """Return a text, empty if it is missing."""
@@ -82,20 +85,27 @@ class Explorer:
     study : StudyView, optional
         Study whose maps are shown.
 
+    Attributes
+    ----------
+    answers : dict of str to callable
+        Functions by the names of requests; they return a payload, a stream, the bytes of a file, or plain values.
+
     Examples
     --------
     >>> explorer = Explorer()
     >>> query = Query({"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"})
-    >>> explorer.answer("case", query).header["rests"]
+    >>> explorer.answers["case"](query).header["rests"]
     1
     """
 
     def __init__(self, opening: Mapping[str, str] | None = None, study: StudyView | None = None) -> None:
         self.opening, self.study = dict(opening or {}), study
         self.uploads = UploadStore()
-        self._simulated = RecentCache[SimulatedCase](_MAX_ROWS, _count_rows)
-        self._assessed = RecentCache[AssessedCase](_MAX_ASSESSMENTS)
-        self._answers: dict[str, Callable[[Query], Any]] = {
+        self._simulated = lru_cache(_MAX_RESPONSES)(self._simulate)
+        self._assessed = lru_cache(_MAX_ASSESSMENTS)(
+            lambda case, texts: assess_case(read_case(dict(case), self.uploads), dict(texts), self.uploads)
+        )
+        self.answers: dict[str, Callable[[Query], Any]] = {
             "start": self._start,
             "case": lambda query: simulated.describe_case(self.simulate(query.case), query.window),
             "details": self._details,
@@ -109,18 +119,9 @@ class Explorer:
             "assessment": lambda query: describe_assessment(self._assess(query)),
             "list": lambda query: list_records(self.uploads, read_entries(query.get("answers"))),
             "remove": self._remove,
-            "study": lambda query: self._require_study().slice(query.fields),
+            "study": lambda query: self._require_study().select(query.fields),
             "study/point": lambda query: self._require_study().point_to_texts(query.fields, self.uploads),
         }
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the requests."""
-        return tuple(self._answers)
-
-    def answer(self, name: str, query: Query) -> Any:
-        """Return the answer to a request: a payload, a stream, bytes of a file, or plain values."""
-        return self._answers[name](query)
 
     def add_file(self, name: str, data: bytes) -> dict[str, Any]:
         """Store a record or a mesh, and describe it; unreadable files are not kept."""
@@ -128,9 +129,9 @@ class Explorer:
         try:
             if not is_mesh(name):
                 return self.uploads.describe_file(key)
-            description = {"key": key, "name": self.uploads.file(key).name, "azimuth": 0.0}
+            description = {"key": key, "name": self.uploads.get_file(key).name, "azimuth": 0.0}
             try:
-                solid = self.uploads.body(f"file:{key}", {}, None, None).solid
+                solid = self.uploads.read_body(f"file:{key}").solid
             except BlockError as error:
                 if error.argument is None:
                     raise
@@ -142,12 +143,11 @@ class Explorer:
 
     def simulate(self, texts: Texts) -> SimulatedCase:
         """Return a case with its response."""
+        return self._simulated(tuple(sorted(texts.items())))
 
-        def simulate() -> SimulatedCase:
-            case = read_case(texts, self.uploads)
-            return SimulatedCase(case, case.simulate())
-
-        return self._simulated.get(_create_key(texts), simulate)
+    def _simulate(self, texts: tuple[tuple[str, str], ...]) -> SimulatedCase:
+        case = read_case(dict(texts), self.uploads)
+        return SimulatedCase(case, case.simulate())
 
     def _start(self, _: Query) -> dict[str, Any]:
         study = None if self.study is None else self.study.describe()
@@ -188,16 +188,14 @@ class Explorer:
         return periodic.sweep_point_to_texts(sweep, value, state)
 
     def _assess(self, query: Query) -> AssessedCase:
-        return self._assessed.get(
-            _create_key(query.fields), lambda: assess_case(self._case(query), query.fields, self.uploads)
-        )
+        return self._assessed(tuple(query.case.items()), tuple(query.select(ASSESSMENT_NAMES).items()))
 
     def _remove(self, query: Query) -> dict[str, int]:
         """Remove a file and its responses, and return the number of remaining files."""
         self.uploads.remove(query.get("key"))
-        for cache in (self._simulated, self._assessed):
-            cache.remove(f"file:{query.get('key')}")
-        return self.uploads.usage()
+        self._simulated.cache_clear()
+        self._assessed.cache_clear()
+        return self.uploads.count_usage()
 
     def _require_study(self) -> StudyView:
         if self.study is None:
@@ -211,23 +209,12 @@ class Explorer:
             raise OptionError(f"a case is written as one of {', '.join(EXPORTS)}, not {form[:20]!r}")
         with tempfile.TemporaryDirectory(prefix="rocking-") as folder:
             file = Path(folder) / f"file.{form}"
-            if form == "report.html":
-                self._assess(query).result.to_html(file)
+            if form in _TABLES:
+                self.simulate(query.case).response.to_csv(file, _TABLES[form])
+            elif form == "nc":
+                self.simulate(query.case).response.to_netcdf(file)
             elif form == "assessment.nc":
                 self._assess(query).result.to_netcdf(file)
-            elif form in _TABLES:
-                self.simulate(query.case).response.to_csv(file, _TABLES[form])
             else:
-                self.simulate(query.case).response.to_netcdf(file)
+                self._assess(query).result.to_html(file)
             return file.read_bytes()
-
-
-def _create_key(texts: Texts) -> tuple[str, ...]:
-    return tuple(sorted(f"{name}={value}" for name, value in texts.items() if value))
-
-
-def _count_rows(shown: SimulatedCase) -> int:
-    """Count the steps of a response and the samples of its motion, or return a minimum if there are few."""
-    motion = shown.case.motion
-    samples = 0 if motion is None else len(motion.breakpoints) * (1 if motion.vertical is None else 2)
-    return max(samples + len(shown.response.solution.trail.nodes), _MAX_ROWS // _MAX_RESPONSES)

@@ -14,16 +14,26 @@ from typing import Any, Final, NamedTuple
 from rocking.block import Block
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.engine.schemes import ChatteringScheme, chattering_scheme
-from rocking.errors import BlockError, MotionError, OptionError
-from rocking.explorer.meshes import MeshBody, find_pivots
+from rocking.errors import MotionError, OptionError
+from rocking.explorer.meshes import MeshBody
 from rocking.explorer.motions import read_motion_values
-from rocking.explorer.parameters import BLOCK_NAMES, NAMES, PARAMETERS, SHAPES, Texts, Values, clean_texts
+from rocking.explorer.parameters import (
+    BLOCK_NAMES,
+    MESH_OPTIONS,
+    PARAMETERS,
+    SHAPES,
+    Texts,
+    Values,
+    clean_texts,
+)
 from rocking.explorer.uploads import UploadStore
-from rocking.inputs.bodies import create_block, write_block_call
+from rocking.inputs.bodies import create_block, find_description, write_block_call
+from rocking.inputs.texts import format_arguments
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import MAX_ACCELERATION, TOO_STRONG
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
+from rocking.solid.solid import compute_plane
 
 #: Maximum product of both restitutions for which a page waits until the block rests.
 _MAX_RESTITUTION_PRODUCT: Final = 0.998
@@ -43,11 +53,11 @@ class Case:
     texts: Texts  # from which the case was read
     options: dict[str, Any]  # arguments besides block and motion
     block: Block
-    block_call: str  # Python expression
+    block_expression: str  # Python expression
     block_options: Texts  # of the command
     body: MeshBody | None  # of a mesh
     motion: Motion | None
-    motion_call: str  # Python expression
+    motion_expression: str  # Python expression
     words: tuple[str, ...]  # of the command; empty if the motion has no name
     motion_preamble: str  # line of Python before the motion, or empty
 
@@ -141,37 +151,28 @@ class _WrittenBlock(NamedTuple):
     """Block with equivalent Python code and options of a command."""
 
     block: Block
-    python: str
+    expression: str  # Python
     options: Texts
     body: MeshBody | None = None  # of a mesh
 
 
 def _read_block(texts: Texts, values: Values, uploads: UploadStore) -> _WrittenBlock:
     """Create the block of a case."""
-    names = values.keys() & BLOCK_NAMES - {"restitution"}
-    shape = next((shape for shape in SHAPES if {*shape.needed} <= names <= {*shape.needed, *shape.optional}), None)
-    if shape is None:
-        raise BlockError(
-            "a block has either {} and {} (m) and perhaps {}, or {} (rad/s) and {}, or {}, {} and {} (m), or {} and "
-            "{} (degrees)",
-            *(name for shape in SHAPES[:-1] for name in (*shape.needed, *shape.optional)),
-            *SHAPES[-1].needed,
-        )
-    if shape.name == "mesh":
+    if find_description(values, SHAPES).name == "mesh":
         return _read_mesh_block(texts, values, uploads)
-    block_values = {name: values[name] for name in NAMES if name in BLOCK_NAMES or name == "gravity" if name in values}
-    options = {name: texts[name] for name in block_values if name != "gravity"}
+    block_values = {name: values[name] for name in (*BLOCK_NAMES, "gravity") if name in values}
+    options = {name: texts[name] for name in BLOCK_NAMES if name in texts}
     return _WrittenBlock(create_block(block_values), write_block_call(block_values), options)
 
 
 def _read_mesh_block(texts: Texts, values: Values, uploads: UploadStore) -> _WrittenBlock:
     """Create the block of a mesh in the plane of an azimuth."""
-    body = uploads.body(texts["mesh"], texts, values.get("tolerance"), values.get("gravity"))
-    azimuth, restitution = values["azimuth"], values.get("restitution")
-    block = body.solid.block(azimuth, restitution=restitution)
-    distances, height, gyration = find_pivots(body, azimuth)
-    options = {"pivots": ",".join(map(repr, distances)), "height_of_mass": repr(height), "gyration": repr(gyration)}
-    if restitution is not None:
-        options["restitution"] = texts["restitution"]
-    python = f"{body.call}.block({azimuth!r}" + ("" if restitution is None else f", restitution={restitution!r}") + ")"
-    return _WrittenBlock(block, python, options, body)
+    body = uploads.read_body(texts["mesh"], **{name: texts[name] for name in MESH_OPTIONS if name in texts})
+    plane = compute_plane(body.solid, values["azimuth"])
+    distances = ",".join(map(repr, plane.pivots.distance.tolist()))
+    options = {"pivots": distances, "height_of_mass": repr(plane.height), "gyration": repr(plane.gyration)}
+    restitution = {name: values[name] for name in ("restitution",) if name in values}
+    options |= {name: texts[name] for name in restitution}
+    written_arguments = ", ".join(filter(None, (repr(values["azimuth"]), format_arguments(restitution))))
+    expression = f"{body.expression}.block({written_arguments})"
+    return _WrittenBlock(body.solid.block(values["azimuth"], **restitution), expression, options, body)

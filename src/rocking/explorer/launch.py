@@ -7,7 +7,6 @@ import threading
 import webbrowser
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from importlib import util
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlencode
@@ -17,10 +16,7 @@ from rocking.core.threads import set_options
 from rocking.errors import OptionError, describe_install
 
 if TYPE_CHECKING:
-    import uvicorn
-
     from rocking.explorer.core import Explorer
-    from rocking.explorer.server import App
 
 #: Address that only this machine can reach, and maximum number of connections.
 LOCAL_ADDRESS: Final = "127.0.0.1"
@@ -32,25 +28,33 @@ _HEADERS: Final = [
 ]  # fmt: skip
 
 
-def require_packages() -> None:
-    """Raise `OptionError` unless the packages of the explorer are installed."""
-    if any(util.find_spec(name) is None for name in ("starlette", "uvicorn")):
-        raise OptionError(f"the explorer needs packages that are not installed: {describe_install('explorer')}")
-
-
-@dataclass(frozen=True)
 class Server:
-    """Listening server with its application."""
+    """Server of an explorer that listens on a port of this machine (0: a free one)."""
 
-    app: App
-    server: uvicorn.Server
-    socket: socket.socket
-    port: int
+    def __init__(self, explorer: Explorer, *, port: int = 0) -> None:
+        if any(util.find_spec(name) is None for name in ("starlette", "uvicorn")):
+            raise OptionError(f"the explorer needs packages that are not installed: {describe_install('explorer')}")
+        import uvicorn
 
-    def link(self, texts: Mapping[str, str] | None = None, *, path: str = "/") -> str:
+        from rocking.explorer.server import App
+
+        checks.integer(port, "port", OptionError, 0, 65535)
+        try:
+            self.socket = socket.create_server((LOCAL_ADDRESS, port))
+        except OSError as error:
+            message = f"{{}} {port} cannot be used ({error.strerror}): choose another one"
+            raise OptionError(message, "port", value=port) from None
+        self.app, self.port = App(explorer), self.socket.getsockname()[1]
+        config = uvicorn.Config(
+            self.app.asgi, log_level="error", access_log=False, ws="none", timeout_keep_alive=10, headers=_HEADERS,
+            limit_concurrency=_MAX_CONNECTIONS, timeout_graceful_shutdown=1,
+        )  # fmt: skip
+        self.server = uvicorn.Server(config)
+
+    def create_link(self, texts: Mapping[str, str] | None = None, *, path: str = "/") -> str:
         """Return a link that opens the page at a path once, with the texts of a case."""
         query = f"?{urlencode(texts)}" if texts else ""
-        return f"http://{LOCAL_ADDRESS}:{self.port}{path}{query}#token={self.app.new_token()}"
+        return f"http://{LOCAL_ADDRESS}:{self.port}{path}{query}#token={self.app.create_token()}"
 
     def run(self) -> None:
         """Serve until interrupted."""
@@ -63,28 +67,7 @@ class Server:
 
     def announce(self, *, open_browser: bool, path: str = "/") -> None:
         """Print the link to a path, and open it in a browser, whose request waits until the server has started."""
-        link = self.link(path=path)
+        link = self.create_link(path=path)
         print(f"rocking explorer: {link} (once, in one browser; Ctrl-C ends it)", flush=True)
         if open_browser:
             threading.Thread(target=webbrowser.open, args=(link,), daemon=True).start()
-
-
-def start_listening(explorer: Explorer, *, port: int = 0) -> Server:
-    """Bind the explorer's application to a port of this machine (0: a free one)."""
-    require_packages()
-    import uvicorn
-
-    from rocking.explorer.server import App
-
-    checks.integer(port, "port", OptionError, 0, 65535)
-    try:
-        listener = socket.create_server((LOCAL_ADDRESS, port))
-    except OSError as error:
-        message = f"{{}} {port} cannot be used ({error.strerror}): choose another one"
-        raise OptionError(message, "port", value=port) from None
-    app = App(explorer)
-    config = uvicorn.Config(
-        app.asgi, log_level="error", access_log=False, ws="none", timeout_keep_alive=10,
-        limit_concurrency=_MAX_CONNECTIONS, timeout_graceful_shutdown=1, headers=_HEADERS,
-    )  # fmt: skip
-    return Server(app, uvicorn.Server(config), listener, listener.getsockname()[1])

@@ -17,12 +17,13 @@ from rocking.chattering.duration import critical_amplitude
 from rocking.chattering.maps import UpliftOutcome, classify_uplifts, find_last_exceedance
 from rocking.core.arrays import Floats, Integers, split_range
 from rocking.core.constants import STANDARD_GRAVITY
+from rocking.engine.problem import compute_uplift_thresholds
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup, Task, simulate_tasks
 from rocking.errors import OptionError
 from rocking.explorer.inputs import Case, block_to_texts, require_possible, require_rest, require_sticking
 from rocking.explorer.motions import create_pulse, is_pulse, read_pulse_arguments, write_pulse
-from rocking.explorer.parameters import BLOCK_NAMES, QUANTITIES, Texts, list_names, read_count
+from rocking.explorer.parameters import BLOCK_NAMES, Texts, list_names, read_count
 from rocking.explorer.payload import Payload
 from rocking.inputs.declared import SCALINGS
 from rocking.inputs.quantities import read_number
@@ -182,25 +183,20 @@ def _make_blocks(grid: MapGrid, x: Floats, y: Floats) -> tuple[Blocks, Floats, F
             sides["restitution"] = np.array([[housner_restitution(alpha)] * 2 for alpha in sides["alpha"][:, 0]])
     if "restitution" in points:
         sides["restitution"] = np.repeat(points["restitution"][:, None], 2, axis=1)
-    factors = np.ones(x.size)
+    blocks, factors = Blocks(**sides, gravity=case.block.gravity), np.ones(x.size)
     if "pga" in points:
         factors = points["pga"] * STANDARD_GRAVITY / grid.motion.pga
     elif "a" in points:
-        factors = points["a"] * _compute_thresholds(grid, sides["alpha"]).min(axis=1) / grid.motion.pga
-    return Blocks(**sides, gravity=case.block.gravity), factors, time_scale
-
-
-def _compute_thresholds(grid: MapGrid, alpha: Floats) -> Floats:
-    """Return the uplift accelerations, m/s^2, of blocks of these slendernesses, shape (n, 2)."""
-    slopes: Floats = alpha if grid.case.model == "linear" else np.tan(alpha)
-    return grid.case.block.gravity * slopes
+        factors = points["a"] * compute_uplift_thresholds(blocks, case.model)[0].min(axis=1) / grid.motion.pga
+    return blocks, factors, time_scale
 
 
 def simulate_grid(grid: MapGrid) -> Generator[Payload]:
     """Simulate the points of a grid from coarse to fine, and yield them as they are completed."""
     y, x = (values.ravel() for values in np.meshgrid(grid.y.values, grid.x.values, indexing="ij"))
     blocks, factors, time_scale = _make_blocks(grid, x, y)
-    conditions = np.column_stack([_compute_thresholds(grid, blocks.alpha) / factors[:, None], factors])
+    thresholds, _ = compute_uplift_thresholds(blocks, grid.case.model)
+    conditions = np.column_stack([thresholds / factors[:, None], factors])
     last_exceedances: dict[tuple[float, ...], float | None] = {}
 
     def tasks() -> Iterator[Task]:
@@ -264,7 +260,6 @@ def describe_map(grid: MapGrid) -> dict[str, Any]:
         "x": _describe_axis(grid.x),
         "y": _describe_axis(grid.y),
         "case": [find_axis_value(grid.case, axis.name) for axis in (grid.x, grid.y)],
-        "quantities": list(QUANTITIES),
         "outcomes": [outcome.name.lower() for outcome in UpliftOutcome],
         "curve": None if curve is None else curve.tolist(),
     }

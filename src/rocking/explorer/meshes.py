@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, BinaryIO, Final
@@ -13,10 +13,9 @@ import numpy as np
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.explorer.payload import Payload
-from rocking.inputs.quantities import read_densities, read_number
 from rocking.solid import ResistanceRose, Solid
 from rocking.solid.mesh import compute_properties
-from rocking.solid.solid import Plane, compute_plane
+from rocking.solid.solid import compute_plane
 from rocking.solid.support import Sections, compute_directions, compute_sections
 
 #: Maximum number of triangles of a mesh; about six seconds of work.
@@ -28,21 +27,14 @@ _read_lock = threading.Lock()
 #: Azimuths of the rose, degrees.
 _AZIMUTHS: Final = np.arange(0.0, 360.0, 2.0)
 
-#: Texts that describe a body, and how each is read as an argument of `rocking.Solid.from_mesh`.
-_READERS: Final[Mapping[str, Callable[[str], Any]]] = {
-    "density": lambda text: read_densities(text, "density"),
-    "up": str,
-    "unit": lambda text: text if text.isalpha() else read_number(text, "unit"),
-}
-
 
 @dataclass(frozen=True, eq=False)
 class MeshBody:
-    """Body of a mesh, with its file name and outline; ``call`` is the Python expression."""
+    """Body of a mesh, with its sections, and the Python expression that creates it."""
 
     solid: Solid
     sections: Sections
-    call: str
+    expression: str
 
     @cached_property
     def rose(self) -> ResistanceRose:
@@ -55,7 +47,7 @@ class MeshBody:
         outline[:, 2:] -= float(self.solid.centre[:2] @ np.asarray(compute_directions(azimuth)[0]))
         return outline
 
-    def plane(self, azimuth: float) -> dict[str, Any]:
+    def describe_plane(self, azimuth: float) -> dict[str, Any]:
         """Describe the section in the plane of an azimuth: the rocking edges, m from its centre of mass."""
         plane = compute_plane(self.solid, azimuth)
         distance, low, high = (np.asarray(pivot_values).tolist() for pivot_values in plane.pivots)
@@ -87,21 +79,6 @@ def describe_body(body: MeshBody) -> Payload:
         "piece": np.cumsum([len(piece) for piece in pieces], dtype=float),
     }
     return Payload(header, arrays)
-
-
-def find_pivots(body: MeshBody, azimuth: float) -> tuple[tuple[float, float], float, float]:
-    """Return the pivot distances, height of mass and radius of gyration of a body in a plane, m."""
-    plane: Plane = compute_plane(body.solid, azimuth)
-    plus, minus = plane.pivots.distance.tolist()
-    return (plus, minus), plane.height, plane.gyration
-
-
-def read_options(texts: Mapping[str, str], tolerance: float | None, gravity: float | None) -> dict[str, Any]:
-    """Read the texts that describe a body as arguments of `rocking.Solid.from_mesh`."""
-    options = {name: read(texts[name]) for name, read in _READERS.items() if name in texts}
-    return options | {
-        name: value for name, value in (("tolerance", tolerance), ("gravity", gravity)) if value is not None
-    }
 
 
 def read_body(name: str, stream: BinaryIO | None, arguments: Mapping[str, Any]) -> MeshBody:

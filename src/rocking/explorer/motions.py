@@ -16,8 +16,7 @@ from rocking.explorer.uploads import UploadStore
 from rocking.inputs.declared import SCALINGS
 from rocking.inputs.pulses import FAMILIES, read_pulse
 from rocking.inputs.quantities import read_acceleration, read_scaling
-from rocking.inputs.texts import format_arguments as written_arguments
-from rocking.inputs.texts import format_option, format_path
+from rocking.inputs.texts import format_arguments, format_option, format_path
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 
@@ -29,9 +28,9 @@ class WrittenMotion(NamedTuple):
     """Motion with equivalent Python code and words of a command."""
 
     motion: Motion | None
-    python: str  # expression
+    expression: str  # Python
     words: tuple[str, ...]  # of a command
-    preamble: str = ""  # line of Python before the expression, with its end
+    preamble: str = ""  # line before the expression, with its end
 
 
 def read_motion(texts: Texts, uploads: UploadStore) -> WrittenMotion:
@@ -45,17 +44,16 @@ def read_motion(texts: Texts, uploads: UploadStore) -> WrittenMotion:
 def read_motion_values(texts: Texts, values: Values, uploads: UploadStore) -> WrittenMotion:
     """Create the motion of a case, scaled and with its vertical component."""
     target = read_scaling({name: texts[name] for name in SCALINGS if name in texts}, _read_level)
-    name = values["motion"]
-    read = _read_unscaled(name, values, uploads)
+    written = _read_unscaled(values["motion"], values, uploads)
     if "vertical" in values:
-        read = _add_vertical(read, name, values, uploads)
-    if target is not None:
-        if read.motion is None:
-            names = [scaling for scaling in SCALINGS if scaling in texts]
-            raise OptionError("{} scales a ground motion: choose one, or leave the scaling out", *names)
-        python = f"{read.python}.{_write_scaling(*target)}"
-        read = read._replace(motion=_scale_motion(read.motion, *target), python=python)
-    return read
+        written = _add_vertical(written, values, uploads)
+    if target is None:
+        return written
+    if written.motion is None:
+        names = [scaling for scaling in SCALINGS if scaling in texts]
+        raise OptionError("{} scales a ground motion: choose one, or leave the scaling out", *names)
+    expression = f"{written.expression}.{_write_scaling(*target)}"
+    return written._replace(motion=_scale_motion(written.motion, *target), expression=expression)
 
 
 def _read_level(text: str, name: str) -> float:
@@ -75,26 +73,23 @@ _combine = functools.lru_cache(maxsize=4)(Motion.with_vertical)
 _load_shipped = functools.cache(records.load)
 
 
-def _add_vertical(
-    horizontal: WrittenMotion, horizontal_name: str, values: Values, uploads: UploadStore
-) -> WrittenMotion:
-    """Add the vertical component."""
-    name, (kind, _, key) = values["vertical"], horizontal_name.partition(":")
-    if horizontal.motion is None or is_pulse(horizontal_name) or kind == "given":
+def _add_vertical(horizontal: WrittenMotion, values: Values, uploads: UploadStore) -> WrittenMotion:
+    """Add the vertical component: a record, another file, or a channel of the same file."""
+    name, (kind, _, key) = values["vertical"], values["motion"].partition(":")
+    if horizontal.motion is None or is_pulse(kind) or kind == "given":
         raise OptionError("{} goes with a record: choose one, or leave the component out", "vertical")
+    other_key, _, channel = name.removeprefix("file:").partition("#")
     if name.startswith("file:"):
-        other_key, _, channel = name.removeprefix("file:").partition("#")
         vertical = _read_file(other_key, values, channel or None, uploads)
-        words = vertical.words if not channel else ()
-    elif name in records.names():
-        vertical, words = _read_unscaled(name, {}, uploads), (name,)
-    elif kind == "file":
+        words = () if channel else vertical.words
+    elif kind == "file" and name not in records.names():
         vertical, words = _read_file(key, values, name, uploads), (name,)
     else:
-        raise OptionError(f"{{}}: there is no shipped record {name[:40]!r}", "vertical", value=name)
+        vertical = _load_record(name, "vertical")
+        words = vertical.words
     return WrittenMotion(
         _combine(horizontal.motion, vertical.motion),
-        f"{horizontal.python}.with_vertical({vertical.python})",
+        f"{horizontal.expression}.with_vertical({vertical.expression})",
         (*horizontal.words, *format_option("vertical", *words)) if horizontal.words and words else (),
     )
 
@@ -106,34 +101,36 @@ def _read_unscaled(name: str, values: Values, uploads: UploadStore) -> WrittenMo
     if name == "none":
         return WrittenMotion(None, "None", ())
     if is_pulse(name):
-        call = f"rocking.pulses.{read_pulse(name)[0].make.__name__}({written_arguments(read_pulse_arguments(name))})"
+        arguments = format_arguments(read_pulse_arguments(name))
+        call = f"rocking.pulses.{read_pulse(name)[0].make.__name__}({arguments})"
         return WrittenMotion(create_pulse(name), call, ("--pulse", name))
     if kind == "given":
-        motion = uploads.motion(key)
-        name = "".join(letter for letter in motion.name if letter.isprintable())  # a line break would end the comment
-        variable = f"given_{key[:6]}"
-        return WrittenMotion(
-            motion, variable, (), f"{variable} = ...  # {name}: a motion of the study\n"
-        )
+        motion, variable = uploads.get_motion(key), f"given_{key[:6]}"
+        label = "".join(letter for letter in motion.name if letter.isprintable())  # a line break would end the comment
+        return WrittenMotion(motion, variable, (), f"{variable} = ...  # {label}: a motion of the study\n")
     if kind == "file":
         return _read_file(key, values, values.get("channel"), uploads)
+    return _load_record(name, "motion")
+
+
+def _load_record(name: str, argument: str) -> WrittenMotion:
+    """Load a shipped record, which an argument names."""
     if name not in records.names():
-        raise OptionError(f"{{}}: there is no shipped record {name[:40]!r}", "motion", value=name)
+        raise OptionError(f"{{}}: there is no shipped record {name[:40]!r}", argument, value=name)
     return WrittenMotion(_load_shipped(name), f"rocking.records.load({name!r})", (name,))
 
 
 def _read_file(key: str, values: Values, channel: str | None, uploads: UploadStore) -> WrittenMotion:
     """Read a channel of a file with the step and units of the texts, unless a separate vertical lacks them."""
     names = ("dt", "units", "baseline", "highpass")
-    options: dict[str, Any] = {"channel": channel} | {name: values[name] for name in names if name in values}
-    vertical = values.get("vertical", "")
+    vertical, stated = values.get("vertical", ""), set[str]()
     if vertical.startswith("file:") or vertical in records.names():
         stated = {"dt", "units"} - {*uploads.describe_file(key)["missing"]}
-        options = {name: value for name, value in options.items() if name not in stated}
-    options = {name: value for name, value in options.items() if value is not None}
-    file, arguments = uploads.file(key).name, written_arguments(options)
-    call = f"rocking.read({file!r}{', ' if arguments else ''}{arguments})"
-    return WrittenMotion(uploads.read(key, **options), call, (format_path(file),))
+    options = {} if channel is None else {"channel": channel}
+    options |= {name: values[name] for name in names if name in values and name not in stated}
+    file = uploads.get_file(key).name
+    arguments = ", ".join(filter(None, (repr(file), format_arguments(options))))
+    return WrittenMotion(uploads.read(key, **options), f"rocking.read({arguments})", (format_path(file),))
 
 
 def is_pulse(text: str) -> bool:
@@ -151,19 +148,14 @@ def read_pulse_arguments(text: str) -> dict[str, Any]:
     """
     _, arguments = read_pulse(text)
     for name in ("cycles", "gamma"):
-        if arguments.get(name, 0.0) > MAX_CYCLES:
-            raise MotionError(
-                f"{{}} of a pulse may be {MAX_CYCLES:g} here at most, not {arguments[name]:g}",
-                name,
-                value=arguments[name],
-            )
+        if (count := arguments.get(name, 0.0)) > MAX_CYCLES:
+            raise MotionError(f"{{}} of a pulse may be {MAX_CYCLES:g} here at most, not {count:g}", name, value=count)
     return arguments
 
 
 def write_pulse(text: str, arguments: Mapping[str, Any]) -> str:
     """Write a pulse of the family of a text with these parameters, in SI units."""
-    written_arguments = ",".join(f"{name}={value}" for name, value in arguments.items())
-    return f"{read_pulse(text)[0].name}:{written_arguments}"
+    return f"{read_pulse(text)[0].name}:" + ",".join(f"{name}={value}" for name, value in arguments.items())
 
 
 def create_pulse(text: str) -> Motion:

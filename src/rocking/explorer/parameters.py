@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from rocking.core import checks
 from rocking.core.constants import MODELS, VERSION
 from rocking.engine.schemes import chattering_scheme
 from rocking.errors import OptionError
 from rocking.explorer.payload import load_english_texts
-from rocking.inputs.declared import BLOCK_DESCRIPTIONS, INPUTS, SCALINGS, Input
+from rocking.inputs.declared import BLOCK_DESCRIPTIONS, INPUTS, SCALINGS, BlockDescription, Input
 from rocking.inputs.pulses import FAMILIES
 from rocking.inputs.quantities import read_number
 from rocking.solid.mesh import SHIPPED_MESHES
+from rocking.solid.solid import Solid
 
 Texts = Mapping[str, str]
 
@@ -32,12 +33,12 @@ _MAX_TEXT_LENGTH: Final = 300
 
 
 #: Texts for a map of a case or of a study, for a diagram, and for an assessment, by name.
-MAP: Final = (
+MAP_NAMES: Final = (
     "x", "x_from", "x_to", "y", "y_from", "y_to", "points", "quantity",
     *(f"{name}_index" for name in ("p", "alpha", "restitution", "block", "motion", "scale", "polarity")),
 )  # fmt: skip
-SWEEP: Final = ("sweep", "sweep_from", "sweep_to", "sweep_points")
-ASSESSMENT: Final = ("records", "measure", "measure_period", "level_from", "level_to", "levels")
+SWEEP_NAMES: Final = ("sweep", "sweep_from", "sweep_to", "sweep_points")
+ASSESSMENT_NAMES: Final = ("records", "measure", "measure_period", "level_from", "level_to", "levels")
 
 #: File name extensions of meshes.
 MESH_KINDS: Final = ("obj", "ply", "stl", "glb", "gltf")
@@ -53,21 +54,17 @@ SHOWN_IN: Final[Mapping[str, tuple[str, ...]]] = {
 DEFAULT: Final = {name: PARAMETERS[name].default for name in ("width", "height", "motion", "pga")}
 
 
-class PageShape(NamedTuple):
-    """Description of a block on the page: name, and required and optional parameters."""
+#: Texts of a mesh that are arguments of `rocking.Solid.from_mesh`.
+MESH_OPTIONS: Final = ("density", "up", "unit", "tolerance", "gravity")
 
-    name: str
-    needed: tuple[str, ...]
-    optional: tuple[str, ...] = ()
-
-
+#: Descriptions of a block on the page.
 SHAPES: Final = (
     *(
-        PageShape(shape.name, shape.needed, tuple(name for name in shape.optional if name in PARAMETERS))
+        shape._replace(optional=tuple(name for name in shape.optional if name in PARAMETERS))
         for shape in BLOCK_DESCRIPTIONS
         if PARAMETERS.keys() >= {*shape.needed}
     ),
-    PageShape("mesh", ("mesh", "azimuth"), ("up", "unit", "density", "tolerance")),
+    BlockDescription("mesh", ("mesh", "azimuth"), MESH_OPTIONS[:-1], Solid.block),
 )
 
 _PERIOD: Final = Input("period", "motion", "duration", "", "s", "1", 0.05, 5.0, True)
@@ -122,18 +119,16 @@ def list_names(*groups: str) -> tuple[str, ...]:
     return tuple(name for name, parameter in PARAMETERS.items() if parameter.group in groups)
 
 
-NAMES: Final = tuple(PARAMETERS)
-
 #: Names of the texts that describe the block of a case.
-BLOCK_NAMES: Final = frozenset(list_names("block"))
+BLOCK_NAMES: Final = list_names("block")
 
 
 def clean_texts(texts: Texts) -> dict[str, str]:
     """Return the texts of a case that are not empty."""
     nonempty = {name: value.strip() for name, value in texts.items() if value.strip()}
     for name, value in nonempty.items():
-        if name not in NAMES:
-            raise OptionError(f"a case has no {name[:40]!r}; it has {', '.join(NAMES)}")
+        if name not in PARAMETERS:
+            raise OptionError(f"a case has no {name[:40]!r}; it has {', '.join(PARAMETERS)}")
         if len(value) > _MAX_TEXT_LENGTH:
             raise OptionError(f"{{}} is {len(value)} letters long; at most {_MAX_TEXT_LENGTH} are read", name)
     return {"motion": DEFAULT["motion"], **nonempty} if nonempty else dict(DEFAULT)
@@ -179,11 +174,11 @@ def specification() -> dict[str, Any]:
         "version": VERSION,
         "default": DEFAULT,
         "parameters": [parameter.describe() for parameter in PARAMETERS.values()],
-        "map": list(MAP),
-        "sweep": list(SWEEP),
-        "assessment": list(ASSESSMENT),
+        "map": list(MAP_NAMES),
+        "sweep": list(SWEEP_NAMES),
+        "assessment": list(ASSESSMENT_NAMES),
         "shown_in": {name: list(units) for name, units in SHOWN_IN.items()},
-        "shapes": [shape._asdict() for shape in SHAPES],
+        "shapes": [{"name": name, "needed": needed, "optional": optional} for name, needed, optional, _ in SHAPES],
         "scalings": ["", *SCALINGS],
         "period": _PERIOD.describe(),
         "pulses": {

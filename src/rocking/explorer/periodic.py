@@ -18,7 +18,7 @@ from rocking.dynamics.orbits import create_orbit
 from rocking.errors import OptionError
 from rocking.explorer.inputs import Case, require_possible, require_sticking
 from rocking.explorer.maps import AXES, Axis, read_range
-from rocking.explorer.motions import create_pulse, read_pulse_arguments
+from rocking.explorer.motions import create_pulse, read_pulse_arguments, write_pulse
 from rocking.explorer.parameters import Texts
 from rocking.explorer.payload import Payload
 from rocking.inputs.declared import SCALINGS
@@ -44,15 +44,9 @@ class Sine(NamedTuple):
     phase: float
     cycles: float
 
-    def period(self) -> Motion:
-        """Return one period of the sine."""
+    def create_period(self) -> Motion:
+        """Create one period of the sine."""
         return pulses.sine(self.amplitude, self.frequency, cycles=1, phase=self.phase)
-
-    @property
-    def text(self) -> str:
-        """Text that names the sine in a case."""
-        parameters = {name: value for name, value in self._asdict().items() if value or name != "phase"}
-        return "sine:" + ",".join(f"{name}={value!r}" for name, value in parameters.items())
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,16 +62,16 @@ class Sweep:
         """Amplitude, m/s^2, or frequency, Hz, at which the parameter is 1."""
         return compute_units(self.case)[self.axis.name]
 
-    def sine_at(self, value: float) -> Sine:
+    def choose_sine(self, value: float) -> Sine:
         """Return the sine at a value of the parameter."""
         return self.sine._replace(**{"amplitude" if self.axis.name == "a" else "frequency": value * self.unit})
 
     def compute_diagram(self, values: Floats) -> BifurcationDiagram:
         """Compute the diagram upwards and downwards from rest."""
         return bifurcation_diagram(
-            lambda value: (self.case.block, self.sine_at(value).period()), values, (0.0, 0.0), direction="both",
-            transient_periods=TRANSIENT_PERIODS, recorded_periods=RECORDED_PERIODS, model=self.case.model,
-            chattering=self.case.chattering,
+            lambda value: (self.case.block, self.choose_sine(value).create_period()), values, (0.0, 0.0),
+            direction="both", transient_periods=TRANSIENT_PERIODS, recorded_periods=RECORDED_PERIODS,
+            model=self.case.model, chattering=self.case.chattering,
         )  # fmt: skip
 
 
@@ -103,7 +97,7 @@ def describe_orbit(case: Case) -> Payload:
     """Return the normalised phase plane of a case under its sine without end, and its orbit in words."""
     require_sticking(case)
     sine = find_sine(case)
-    strobe = stroboscopic_map(case.block, sine.period(), model=case.model, chattering=case.chattering)
+    strobe = stroboscopic_map(case.block, sine.create_period(), model=case.model, chattering=case.chattering)
     start = tuple(case.options.get(f"initial_{name}", 0.0) for name in ("rotation", "velocity"))
     for transient, recorded in ((TRANSIENT_PERIODS, RECORDED_PERIODS), (_LONG_TRANSIENT, _MAX_STATES)):
         data = bifurcation_diagram(
@@ -152,7 +146,7 @@ def read_sweep(case: Case, texts: Texts) -> Sweep:
     omega = sine.frequency / compute_units(case)["omega"]
     ends = (0.9, float(f"{max(1.5, 2.5 * omega):.2g}")) if name == "a" else AXES["omega"].close
     sweep = Sweep(case, sine, read_range(name, texts, ("sweep_from", "sweep_to", "sweep_points"), ends))
-    require_possible(sweep.sine_at(float(sweep.axis.values[-1])).amplitude)
+    require_possible(sweep.choose_sine(float(sweep.axis.values[-1])).amplitude)
     return sweep
 
 
@@ -196,7 +190,7 @@ def sweep_point_to_texts(sweep: Sweep, value: float, state: Sequence[float] = ()
     """Return the texts of the case at a value of the parameter, from a state (or from rest)."""
     dropped = {*SCALINGS, "initial_rotation", "initial_velocity"}
     texts = {name: text for name, text in sweep.case.texts.items() if name not in dropped}
-    texts["motion"] = sweep.sine_at(value).text
+    texts["motion"] = write_pulse("sine", sweep.choose_sine(value)._asdict())
     if len(state):
         texts |= {"initial_rotation": repr(state[0]), "initial_velocity": repr(state[1])}
     return texts

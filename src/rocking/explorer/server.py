@@ -6,7 +6,7 @@ import hmac
 import os
 import secrets
 import struct
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -14,6 +14,7 @@ from typing import Any, Final, TypeVar
 import anyio
 import anyio.to_thread
 from starlette.applications import Starlette
+from starlette.background import BackgroundTask
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
@@ -67,7 +68,7 @@ class App:
         self.explorer = explorer
         self._secret, self._tokens = secrets.token_urlsafe(32), list[str]()
         self._html = fill_page(FOLDER.joinpath("index.html").read_text("utf-8"), load_english_texts())
-        self._threads, self._streams = anyio.CapacityLimiter(4), anyio.CapacityLimiter(2)
+        self._threads = anyio.CapacityLimiter(4)
         self.asgi = Starlette(
             routes=[
                 Route("/", self._send_page),
@@ -75,13 +76,13 @@ class App:
                 Mount("/page", _PageFiles(directory=FOLDER)),
                 Route(EXCHANGE, self._exchange, methods=["POST"]),
                 Route("/api/files", self._receive_file, methods=["POST"]),
-                *(Route(f"/api/{name}", self._answer(name)) for name in explorer.names),
+                *(Route(f"/api/{name}", self._answer(name)) for name in explorer.answers),
             ],
             exception_handlers={RockingError: _respond_invalid, Exception: _respond_failure},
         )
         self.asgi.router.redirect_slashes = False
 
-    def new_token(self) -> str:
+    def create_token(self) -> str:
         """Return a token that opens the page once."""
         self._tokens = [*self._tokens[-_MAX_LINKS + 1 :], secrets.token_urlsafe(32)]
         return self._tokens[-1]
@@ -96,7 +97,7 @@ class App:
 
     async def _exchange(self, request: Request) -> Response:
         """Return the secret for an unused token."""
-        token = next((token for token in self._tokens if _carries(request, token)), None)
+        token = next((token for token in self._tokens if _has_credentials(request, token)), None)
         if token is None:
             return _respond_problem(_LINK_REQUIRED, 403)
         self._tokens.remove(token)
@@ -106,12 +107,13 @@ class App:
         """Return a handler that sends the explorer's answer, computed in a thread."""
 
         async def respond(request: Request) -> Response:
-            if not _carries(request, self._secret):
+            if not _has_credentials(request, self._secret):
                 return _respond_problem(_LINK_REQUIRED, 403)
-            answer = await self._run_in_thread(lambda: self.explorer.answer(name, Query(request.query_params)))
+            answer = await self._run_in_thread(lambda: self.explorer.answers[name](Query(request.query_params)))
             if isinstance(answer, Stream):
-                parts = self._encode_parts(answer, request.query_params.get("motion", ""))
-                return StreamingResponse(parts, media_type=_BINARY)
+                parts = _encode_parts(answer, request.query_params.get("motion", ""))
+                close = BackgroundTask(answer.parts.close)  # also when the reader disconnects
+                return StreamingResponse(parts, media_type=_BINARY, background=close)
             if isinstance(answer, Payload | bytes):
                 return Response(answer if isinstance(answer, bytes) else pack(answer), media_type=_BINARY)
             return JSONResponse(to_plain(answer))
@@ -121,28 +123,9 @@ class App:
     async def _run_in_thread(self, compute: Callable[[], T]) -> T:
         return await anyio.to_thread.run_sync(compute, limiter=self._threads)
 
-    async def _encode_parts(self, stream: Stream, motion: str) -> AsyncIterator[bytes]:
-        """Yield payloads behind their lengths; the computation stops when the reader disconnects."""
-
-        def encode_next() -> bytes | None:
-            try:
-                part = next(stream.parts, None)
-            except RockingError as error:
-                part = Payload(_describe_error(error, motion))
-            return None if part is None else _add_length(pack(part))
-
-        yield _add_length(pack(Payload(stream.description)))
-        async with self._streams:
-            try:
-                while (data := await anyio.to_thread.run_sync(encode_next)) is not None:
-                    yield data
-            finally:
-                with anyio.CancelScope(shield=True):
-                    await anyio.to_thread.run_sync(stream.parts.close)
-
     async def _receive_file(self, request: Request) -> Response:
         """Store the body of a request as a file, and describe it."""
-        if not _carries(request, self._secret):
+        if not _has_credentials(request, self._secret):
             return _respond_problem(_LINK_REQUIRED, 403)
         data = bytearray()
         if int(request.headers.get("content-length", 0)) > MAX_FILE_SIZE:  # a number: uvicorn accepts nothing else
@@ -172,14 +155,24 @@ def _build_block_page() -> str:
     return build_page(served=True)
 
 
-def _carries(request: Request, credentials: str) -> bool:
+def _has_credentials(request: Request, credentials: str) -> bool:
     """Whether the Authorization header of a request contains these credentials."""
     header = request.headers.get("authorization", "")
     return hmac.compare_digest(header.encode(), f"Bearer {credentials}".encode())
 
 
-def _add_length(data: bytes) -> bytes:
-    return struct.pack("<Q", len(data)) + data
+def _encode_parts(stream: Stream, motion: str) -> Iterator[bytes]:
+    """Yield payloads behind their lengths."""
+
+    def encode(payload: Payload) -> bytes:
+        data = pack(payload)
+        return struct.pack("<Q", len(data)) + data
+
+    yield encode(Payload(stream.description))
+    try:
+        yield from map(encode, stream.parts)
+    except RockingError as error:
+        yield encode(Payload(_describe_error(error, motion)))
 
 
 def _describe_error(error: RockingError, motion: str) -> dict[str, Any]:

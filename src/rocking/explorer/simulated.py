@@ -71,7 +71,11 @@ class SimulatedCase:
         duration = self.response.duration
         if window is None or window[0] >= duration:
             return compute_active_span(self.response)
-        return check_window(window, duration)
+        start, end = max(window[0], 0.0), min(window[1], duration)
+        if not end - start >= _MIN_WINDOW:
+            limits = f"{_MIN_WINDOW:g} s wide, within the response from 0 to {duration:.6g} s"
+            raise OptionError(f"the window must be at least {limits}", value=window)
+        return start, end
 
 
 def find_unresolved(response: Response, start: float, end: float) -> list[float]:
@@ -106,7 +110,7 @@ def describe_case(shown: SimulatedCase, window: tuple[float, float] | None) -> P
             "gravity_g": block.gravity / STANDARD_GRAVITY,
             "outline": _describe_outline(block, outline),
             "notes": [*map(str, list_block_notes(block)), *(case.body.solid.notes if case.body else ())],
-            "body": None if case.body is None else case.body.plane(case.azimuth),
+            "body": None if case.body is None else case.body.describe_plane(case.azimuth),
         },
         "motion": None if motion is None else _describe_motion(motion),
         "treatment": str(case.chattering),
@@ -206,15 +210,6 @@ def _describe_outline(block: Block, outline: Floats | None) -> dict[str, Any]:
     if outline is None:
         return {**extent, "top": 2.0 * centre, "widest": max(left, right)}
     return {**extent, "top": float(outline[:, 1].max()), "widest": float(np.abs(outline[:, 2:]).max())}
-
-
-def check_window(window: tuple[float, float], duration: float) -> tuple[float, float]:
-    """Return the ends of a window, s, within a response of this duration; reject invalid windows."""
-    start, end = max(window[0], 0.0), min(window[1], duration)
-    if not end - start >= _MIN_WINDOW:
-        message = f"the window must be at least {_MIN_WINDOW:g} s wide, within the response from 0 to {duration:.6g} s"
-        raise OptionError(message, value=window)
-    return start, end
 
 
 def _sample_window(case: Case, response: Response, start: float, end: float, impacts: Floats) -> dict[str, Floats]:

@@ -84,7 +84,7 @@ class StudyView:
             "quantities": [*QUANTITIES],
         }
 
-    def slice(self, texts: Mapping[str, str]) -> Payload:
+    def select(self, texts: Mapping[str, str]) -> Payload:
         """Return one quantity over ``x`` and ``y``; texts such as ``motion_index`` and ``p_index`` fix the others."""
         x, y = (checks.choice(texts.get(direction), direction, OptionError, self._varied) for direction in ("x", "y"))
         quantity = checks.choice(texts.get("quantity", QUANTITIES[0]), "quantity", OptionError, [*QUANTITIES])
@@ -93,11 +93,9 @@ class StudyView:
             raise OptionError("{} and {} must be two different parameters of the study", "x", "y")
         if math.prod(shape) > _MAX_POINTS:
             raise OptionError(f"{shape[1]} by {shape[0]} points are too many for a map")
-        at = {name: self._read_index(texts, name) for name in self.axes if name not in (x, y)}
-        selected = {name: slice(None) if name in (x, y) else at[name] for name in self.axes}
-        blocks = self._blocks[tuple(selected[name] for name in self._grid)]
-        positions = {"scale": self._scales[selected["scale"]], "motion": selected["motion"], "block": blocks.ravel()}
-        positions["polarity"] = selected["polarity"]
+        selected = {name: slice(None) if name in (x, y) else self._read_index(texts, name) for name in self.axes}
+        blocks = self._blocks[tuple(selected.pop(name) for name in self._grid)]
+        positions = {**selected, "scale": self._scales[selected["scale"]], "block": blocks.ravel()}
         results = self.study.results()
         results = results.isel({name: position for name, position in positions.items() if name in results.dims})
         values = results[quantity]

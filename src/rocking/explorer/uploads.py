@@ -5,25 +5,21 @@ from __future__ import annotations
 import hashlib
 import io
 import itertools
-import json
 import threading
-from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from functools import lru_cache
 from pathlib import PurePosixPath, PureWindowsPath
-from typing import Any, Final, Generic, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple
 
 from rocking.core import checks
 from rocking.errors import BlockError, MotionError, RecordError
-from rocking.explorer.meshes import MeshBody, read_body, read_options
-from rocking.explorer.parameters import MESH_KINDS
+from rocking.explorer.meshes import MeshBody, read_body
+from rocking.explorer.parameters import MESH_KINDS, PARAMETERS
 from rocking.motion.motion import Motion
 from rocking.records import formats
 from rocking.records.formats.channel import Channel
 from rocking.records.formats.source import Request
 from rocking.records.units import UNIT_NAMES, find_unit
 from rocking.solid.mesh import SHIPPED_MESHES
-
-V = TypeVar("V")
 
 #: Largest file, bytes: twenty times a long record of three channels.
 MAX_FILE_SIZE: Final = 16 * 2**20
@@ -35,14 +31,11 @@ TOO_LARGE: Final = f"a file may be {_LIMIT} large: cut a record into smaller fil
 MAX_FILES: Final = 120
 MAX_BYTES: Final = 256 * 2**20
 
-#: Maximum number of cached bodies of meshes.
-_MAX_BODIES: Final = 12
+#: Maximum numbers of cached motions, of 60 MB at most, and bodies of meshes.
+_MAX_MOTIONS, _MAX_BODIES = 8, 12
 
 #: Maximum number of samples in a channel: 1.5 hours at 100 Hz. A motion takes some 120 bytes per sample.
 MAX_SAMPLES: Final = 500_000
-
-#: Maximum number of samples of cached motions, of 120 bytes each; the least recently used are removed first.
-MAX_CACHED_SAMPLES: Final = 3_000_000
 
 #: Maximum number of lines in a file (two such channels with a line per sample), and of possibly compressed samples.
 _MAX_LINES, _MAX_FILE_SAMPLES = 2 * MAX_SAMPLES, 8 * MAX_SAMPLES
@@ -60,39 +53,11 @@ class Upload(NamedTuple):
     name: str
     data: bytes
 
-    def stream(self) -> io.BytesIO:
+    def open(self) -> io.BytesIO:
         """Return the content as a stream with the name of the file, for readers."""
         stream = io.BytesIO(self.data)
         stream.name = self.name
         return stream
-
-
-class RecentCache(Generic[V]):
-    """Thread-safe least-recently-used cache with limited total weight."""
-
-    def __init__(self, max_weight: float, weight: Callable[[V], float] = lambda _: 1.0) -> None:
-        self._max_weight, self._weight = max_weight, weight
-        self._lock = threading.Lock()
-        self._values: OrderedDict[tuple[str, ...], V] = OrderedDict()
-
-    def get(self, key: tuple[str, ...], create: Callable[[], V]) -> V:
-        """Return the value of a key, created unless it is cached."""
-        with self._lock:
-            if key in self._values:
-                self._values.move_to_end(key)
-                return self._values[key]
-        value = create()
-        with self._lock:
-            self._values[key] = value
-            while len(self._values) > 1 and sum(map(self._weight, self._values.values())) > self._max_weight:
-                self._values.popitem(last=False)
-        return value
-
-    def remove(self, name: str) -> None:
-        """Remove all values whose keys contain a name."""
-        with self._lock:
-            for key in [key for key in self._values if any(name in part for part in key)]:
-                del self._values[key]
 
 
 class UploadStore:
@@ -102,9 +67,9 @@ class UploadStore:
         self._lock = threading.Lock()
         self._files: dict[str, Upload] = {}
         self._motions: dict[str, Motion] = {}
-        self._record_motions = RecentCache[Motion](MAX_CACHED_SAMPLES, lambda motion: len(motion.breakpoints))
-        self._descriptions = RecentCache[dict[str, Any]](4 * MAX_FILES)
-        self._bodies = RecentCache[MeshBody](_MAX_BODIES)
+        self.read = lru_cache(_MAX_MOTIONS)(self._read)
+        self.describe_file = lru_cache(4 * MAX_FILES)(self._describe_file)
+        self.read_body = lru_cache(_MAX_BODIES)(self._read_body)
 
     def add_file(self, name: str, data: bytes) -> str:
         """Store a record or a mesh, and return its key."""
@@ -126,18 +91,18 @@ class UploadStore:
 
     def remove(self, key: str) -> None:
         """Remove a file and its results."""
-        self.file(key)
+        self.get_file(key)
         with self._lock:
             self._files.pop(key, None)
-        for cache in (self._record_motions, self._descriptions, self._bodies):
-            cache.remove(key)
+        for cached in (self.read, self.describe_file, self.read_body):
+            cached.cache_clear()
 
     def list_records(self) -> tuple[str, ...]:
         """Return the keys of the stored records, in order of upload."""
         with self._lock:
             return tuple(key for key, upload in self._files.items() if not is_mesh(upload.name))
 
-    def usage(self) -> dict[str, int]:
+    def count_usage(self) -> dict[str, int]:
         """Return number and bytes of the stored files, and their limits."""
         with self._lock:
             total = sum(len(upload.data) for upload in self._files.values())
@@ -152,49 +117,39 @@ class UploadStore:
             self._motions[key] = motion
         return key
 
-    def motion(self, key: str) -> Motion:
+    def get_motion(self, key: str) -> Motion:
         """Return a motion of the program."""
         if key not in self._motions:
             raise RecordError("{} is a motion of a study that is not open: choose a point of its map again", "motion")
         return self._motions[key]
 
-    def file(self, key: str, argument: str = "motion") -> Upload:
+    def get_file(self, key: str, argument: str = "motion") -> Upload:
         """Return a stored file, which an argument names."""
         with self._lock:
             if key not in self._files:
                 raise RecordError("the file of {} is not here any more: open it again", argument)
             return self._files[key]
 
-    def read(self, key: str, **options: Any) -> Motion:
+    def _read(self, key: str, **options: Any) -> Motion:
         """Return the motion of a file, with the arguments of `rocking.read`."""
-        upload = self.file(key)
-        corrections = options.get("baseline"), options.get("highpass")
-        request = _create_request(*(options.get(name) for name in ("dt", "units", "channel")))
-        return self._record_motions.get(
-            (key, json.dumps(options)),
-            lambda: _read_channel(upload, formats.read_channel(upload.stream(), request), *corrections),
-        )
+        corrections = options.pop("baseline", None), options.pop("highpass", None)
+        upload = self.get_file(key)
+        return _read_channel(upload, formats.read_channel(upload.open(), _create_request(**options)), *corrections)
 
-    def body(self, name: str, texts: Mapping[str, str], tolerance: float | None, gravity: float | None) -> MeshBody:
-        """Return the body of a mesh, ``statue`` or ``file:KEY``, read with the texts of a case."""
-        upload = self.file(name.removeprefix("file:"), "mesh") if name.startswith("file:") else None
-        if upload is None:
+    def _read_body(self, name: str, **texts: str) -> MeshBody:
+        """Return the body of a mesh, ``statue`` or ``file:KEY``, read with texts named as in `MESH_OPTIONS`."""
+        stream = self.get_file(name.removeprefix("file:"), "mesh").open() if name.startswith("file:") else None
+        if stream is None:
             checks.choice(name, "mesh", BlockError, [*SHIPPED_MESHES])
-        options = read_options(texts, tolerance, gravity)
-        key = name, upload.name if upload else "", json.dumps(options)
-        return self._bodies.get(key, lambda: read_body(name, upload and upload.stream(), options))
+        return read_body(name, stream, {option: PARAMETERS[option].read(text) for option, text in texts.items()})
 
-    def describe_file(self, key: str, **options: Any) -> dict[str, Any]:
+    def _describe_file(self, key: str, **options: Any) -> dict[str, Any]:
         """Describe a file, read with arguments of `rocking.read`: channels, and arguments that reading requires."""
-        upload = self.file(key)
-        return self._descriptions.get((key, json.dumps(options)), lambda: self._describe_file(key, upload, options))
-
-    def _describe_file(self, key: str, upload: Upload, options: dict[str, Any]) -> dict[str, Any]:
-        options, missing = dict(options), list[str]()
+        upload, missing = self.get_file(key), list[str]()
         corrections = options.pop("baseline", None), options.pop("highpass", None)
         while True:
             try:
-                _, channels = formats.read_content(upload.stream(), _create_request(**options))
+                _, channels = formats.read_content(upload.open(), _create_request(**options))
                 break
             except (RecordError, MotionError) as error:
                 name = error.argument

@@ -46,7 +46,9 @@ def find_description(
     names: Iterable[str], descriptions: Sequence[BlockDescription] = BLOCK_DESCRIPTIONS
 ) -> BlockDescription:
     """Return the description that contains the named inputs, or raise `BlockError` if there is not exactly one."""
-    provided = [name for name in BLOCK_INPUTS if name in {*names} and name != "restitution"]
+    described = (name for description in descriptions for name in (*description.needed, *description.optional))
+    known = dict.fromkeys((*BLOCK_INPUTS, *described))
+    provided = [name for name in known if name in {*names} and name != "restitution"]
     for description in descriptions:
         if {*description.needed} <= {*provided} <= {*description.needed, *description.optional}:
             return description

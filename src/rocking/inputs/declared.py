@@ -27,6 +27,13 @@ READERS: Final[Mapping[str, tuple[quantities.NumberReader, str]]] = {
     "acceleration": (quantities.read_acceleration, "m/s^2"),
 }
 
+#: Readers of other texts of each kind.
+_TEXT_READERS: Final[Mapping[str, Callable[[str, str], Any]]] = {
+    "acceleration at a period": quantities.read_level_at_period,
+    "densities": quantities.read_densities,
+    "length unit": quantities.read_length_unit,
+}
+
 
 def read_noted_acceleration(text: str, name: str) -> float:
     """Return an acceleration, m/s^2, with a note if a number without a unit is probably in g."""
@@ -47,8 +54,8 @@ class Input:
     group : str
         Form of the page that contains the input, which comparisons replace as a whole; empty without a field.
     kind : str
-        Type of the text: a key of `READERS`, "acceleration at a period", "text", "flag" (yes or no), or "texts"
-        (several).
+        Type of the text: a key of `READERS`, "acceleration at a period", "densities" (of parts), "length unit", "text",
+        "flag" (yes or no), or "texts" (several).
     help : str
         Help of its option.
     unit, default, low, high, is_logarithmic, step : str, str, float, float, bool, float
@@ -84,10 +91,8 @@ class Input:
         >>> INPUTS["alpha"].read("0.1,0.2"), INPUTS["sa"].read("2@0.5"), INPUTS["pivots"].read("20cm")
         ((0.1, 0.2), (2.0, 0.5), (0.2, 0.2))
         """
-        if self.kind == "acceleration at a period":
-            return quantities.read_level_at_period(text, self.name)
         if self.kind not in READERS:
-            return text
+            return _TEXT_READERS[self.kind](text, self.name) if self.kind in _TEXT_READERS else text
         reader = READERS[self.kind][0]
         if self.arity == "one":
             return reader(text, self.name)
@@ -174,8 +179,8 @@ INPUTS: Final = index_by_name(
     Input("mesh", "block", "text", default="statue"),
     Input("azimuth", "block", "number", "", "°", "90", 0.0, 360.0, step=1.0),
     Input("up", "block", "text"),
-    Input("unit", "block", "text"),
-    Input("density", "block", "text"),
+    Input("unit", "block", "length unit"),
+    Input("density", "block", "densities"),
     Input("tolerance", "block", "length", "", "m"),
     Input("restitution", "block", "number",
         "Factor on the angular speed at an impact, in (0, 1]; one or two; by default from angular momentum (Housner's "

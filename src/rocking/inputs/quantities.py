@@ -207,6 +207,11 @@ def _split_unit(text: str) -> tuple[float | None, str]:
     return (None, "") if match is None else (float(match[1]), match[2] or "")
 
 
+def read_length_unit(text: str, name: str) -> str | float:
+    """Return the name of a unit of length, or its length, m."""
+    return text if text.isalpha() else read_number(text, name)
+
+
 def read_densities(text: str, name: str) -> float | dict[str, float]:
     """Return one density, kg/m^3, or densities of parts by name from entries PART=NUMBER."""
     if "=" not in text:

@@ -122,7 +122,7 @@ export class View {
       if (header.shape) {
         const [rows, columns] = header.shape;
         this.about = {...header, x: this.shown(header.x), y: this.shown(header.y)};
-        this.values = Object.fromEntries(header.quantities.map((/** @type {string} */ name) => [name, new Float64Array(rows * columns).fill(NaN)]));
+        this.values = Object.fromEntries(specification.quantities.map((/** @type {string} */ name) => [name, new Float64Array(rows * columns).fill(NaN)]));
         covered = new Uint8Array(rows * columns).fill(255);
         const at = header.case.map((/** @type {number} */ each, /** @type {number} */ k) => each * this.about[k ? "y" : "x"].scale);
         this.case = at;
