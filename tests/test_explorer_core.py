@@ -508,7 +508,7 @@ def test_files_are_known_by_name_and_content_and_so_many_at_most():
     with pytest.raises(RecordError, match="x: it cannot be kept: 120 files and 256 MiB are kept at most"):
         uploads.add_file("x", b"another")
     assert uploads.add_file("a.txt", b"1 2 3") in uploads.list_records() and len(uploads.list_records()) == MAX_FILES
-    with pytest.raises(RecordError, match="may be 16 MiB large"):
+    with pytest.raises(RecordError, match="may have 16 MiB: cut a record"):
         uploads.add_file("big", bytes(MAX_FILE_SIZE + 1))
 
 

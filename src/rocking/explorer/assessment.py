@@ -43,10 +43,10 @@ assessment.to_html("report.html")
 
 @dataclass(frozen=True, eq=False)
 class AssessedCase:
-    """Assessment of a case's block, the number of each of its records in the list, and an equivalent Python script."""
+    """Assessment of a case's block, the names of all records in the list, and an equivalent Python script."""
 
     result: Assessment
-    numbers: dict[str, int]  # by the name of the record
+    names: list[str]
     script: str
 
 
@@ -61,22 +61,22 @@ def assess_case(case: Case, texts: Texts, uploads: UploadStore) -> AssessedCase:
         raise OptionError("an assessment needs {}: tick one or more in the list", "records")
     require_rest(side.restitution for side in case.block.sides)
     measure, levels = _read_measure(texts), _read_levels(texts)
-    written, numbers, failures = dict[str, WrittenMotion](), dict[str, int](), dict[str, str]()
+    written, failures = dict[str, WrittenMotion](), dict[str, str]()
     titles, stations = zip(*describe_entries(entries, uploads), strict=True)
     names = make_names_unique(titles)
-    for number, (name, entry) in enumerate(zip(names, entries, strict=True)):
+    for name, entry in zip(names, entries, strict=True):
         try:
-            written[name], numbers[name] = read_motion(entry, uploads), number
+            written[name] = read_motion(entry, uploads)
         except RockingError as error:
             failures[name] = str(error)
     motions = {name: record.motion for name, record in written.items() if record.motion is not None}
-    clusters = [stations[numbers[name]] for name in motions]
+    clusters = [station for name, station in zip(names, stations, strict=True) if name in motions]
     options = {name: value for name, value in case.options.items() if name in ("model", "friction", "chattering")}
     options |= {"clusters": clusters} if len({*clusters}) < len(clusters) else {}
     block = case.block.with_labels(name="block")
     result = assess(block, motions, measure=measure, levels=levels, polarity="both", **options)
     result = replace(result, skipped={**failures, **result.skipped})
-    return AssessedCase(result, numbers, _write_script(case, written, measure, levels, options))
+    return AssessedCase(result, names, _write_script(case, written, measure, levels, options))
 
 
 def _read_measure(texts: Texts) -> Measure:
@@ -125,7 +125,7 @@ def describe_assessment(assessed: AssessedCase) -> Payload:
         "statements": describe_object(result, 0),
         "failures": [f"{name}: {reason}" for name, reason in result.skipped.items()],
         "records": [
-            {"number": assessed.numbers[name], "name": name, **{key: data[key].values[k].item() for key in names}}
+            {"number": assessed.names.index(name), "name": name, **{key: data[key].values[k].item() for key in names}}
             for k, name in enumerate(result.motions)
         ],
         "python": assessed.script,

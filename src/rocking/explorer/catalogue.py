@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import PurePath
@@ -84,10 +85,8 @@ def describe_entries(entries: list[dict[str, str]], uploads: UploadStore) -> lis
     """Return title and number of the station of each entry, equal for components of one station."""
     keys = [(entry.get("motion", ""), entry.get("channel")) for entry in entries]
     files = {motion.removeprefix("file:"): entry for (motion, _), entry in zip(keys, entries, strict=True)}
-    components = [*_list_shipped()]
-    for key in uploads.list_records():
-        if key in files:
-            components += _list_channels(uploads, key, files[key])
+    listed = (_list_channels(uploads, key, files[key]) for key in uploads.list_records() if key in files)
+    components = [*_list_shipped(), *itertools.chain(*listed)]
     known: dict[tuple[str, str | None], tuple[str, object]] = {}
     for group in _group_by_station(components):
         for component in group:

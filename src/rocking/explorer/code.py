@@ -95,9 +95,8 @@ def case_as_python(case: Case) -> str:
     print(response.summary())
     """
     options = "".join(f", {name}={value!r}" for name, value in case.options.items())
-    return _CASE_SCRIPT.format(
-        block=case.block_expression, before=case.motion_preamble, motion=case.motion_expression, options=options
-    )  # fmt: skip
+    motion = {"before": case.motion_preamble, "motion": case.motion_expression}
+    return _CASE_SCRIPT.format(block=case.block_expression, **motion, options=options)
 
 
 def case_as_command(case: Case) -> str | None:

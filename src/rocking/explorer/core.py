@@ -179,8 +179,8 @@ class Explorer:
 
     def _sweep(self, query: Query) -> Stream:
         sweep = periodic.read_sweep(self._case(query), query.fields)
-        description = periodic.describe_sweep(sweep) | {"python": sweep_as_python(sweep)}
-        return Stream(description, periodic.simulate_sweep(sweep))
+        axis = {"name": sweep.axis.name, "values": sweep.axis.values.tolist()}
+        return Stream(axis | {"python": sweep_as_python(sweep)}, periodic.simulate_sweep(sweep))
 
     def _sweep_point(self, query: Query) -> dict[str, str]:
         sweep = periodic.read_sweep(self._case(query), query.fields)

@@ -24,7 +24,7 @@ from rocking.explorer.parameters import (
     SHAPES,
     Texts,
     Values,
-    clean_texts,
+    read_texts,
 )
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.bodies import create_block, find_description, write_block_call
@@ -96,8 +96,7 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
     >>> case.block, round(case.motion.pga, 6)
     (<Block: rectangular block, 0.24 m x 1.1 m; p = 3.6146 rad/s, alpha = 0.21482 rad, restitution = 0.93184>, 3.92266)
     """
-    case_texts = clean_texts(texts)
-    values = {name: PARAMETERS[name].read(text) for name, text in case_texts.items()}
+    case_texts, values = read_texts(texts)
     block, motion = _read_block(case_texts, values, uploads), read_motion_values(case_texts, values, uploads)
     if "duration" not in values:
         require_rest(side.restitution for side in block.block.sides)

@@ -38,24 +38,23 @@ _PULSE_POINTS: Final = 32
 
 
 class AxisKind(NamedTuple):
-    """Unit of a parameter of maps, and its initial ranges: close for chattering, wide for overturning."""
+    """Unit of a parameter of maps, and ends of its initial range."""
 
     unit: str
-    close: tuple[float, float]
-    wide: tuple[float, float]
+    low: float
+    high: float
 
 
 AXES: Final = {
-    "omega": AxisKind("", (0.5, 8.0), (0.5, 8.0)),
-    "p": AxisKind("rad/s", (1.0, 6.0), (1.0, 6.0)),
-    "alpha": AxisKind("°", (5.0, 25.0), (5.0, 25.0)),
-    "restitution": AxisKind("", (0.5, 0.97), (0.5, 0.97)),
-    "a": AxisKind("", (1.0, 1.1), (0.5, 8.0)),
-    "pga": AxisKind("g", (0.1, 1.0), (0.1, 2.0)),
+    "omega": AxisKind("", 0.5, 8.0),
+    "p": AxisKind("rad/s", 1.0, 6.0),
+    "alpha": AxisKind("°", 5.0, 25.0),
+    "restitution": AxisKind("", 0.5, 0.97),
+    "a": AxisKind("", 0.5, 8.0),
+    "pga": AxisKind("g", 0.1, 2.0),
 }
 
-#: Parameters of the block, and parameters of the motion's peak.
-_BLOCK_AXES: Final = {"p", "alpha", "restitution"}
+#: Parameters of the motion's peak.
 _PEAK_AXES: Final = {"a", "pga"}
 
 
@@ -125,10 +124,10 @@ def _read_axis(direction: str, case: Case, texts: Texts) -> Axis:
 
 
 def _choose_ends(case: Case, name: str) -> tuple[float, float]:
-    """Return ends of an axis that contain the case: close ones for the chattering under a sine, else wide ones."""
-    (_, close, (low, high)), value = AXES[name], find_axis_value(case, name)
-    if case.texts.get("motion", "").startswith("sine:") and close[0] <= value <= close[1]:
-        return close
+    """Return ends of an axis that contain the case."""
+    (_, low, high), value = AXES[name], find_axis_value(case, name)
+    if name == "a" and case.texts.get("motion", "").startswith("sine:") and 1.0 <= value <= 1.1:
+        return 1.0, 1.1  # the chattering
     return (low, high) if low <= value <= high else (min(low, 0.5 * value), max(high, float(f"{1.5 * value:.2g}")))
 
 
@@ -239,13 +238,13 @@ def compute_critical_amplitudes(grid: MapGrid) -> Floats | None:
 
     They hold for sines that last longer than half a period after the uplift.
     """
-    text, (side, _) = grid.case.texts.get("motion", ""), grid.case.block.sides
+    text = grid.case.texts.get("motion", "")
     if not text.startswith("sine:") or not grid.case.block.is_symmetric or grid.y.name != "a":
         return None
     sine = read_pulse_arguments(text)
     if sine.get("phase") or sine["cycles"] < 1.0 or grid.x.name not in ("omega", "restitution"):
         return None
-    axes: dict[str, Any] = {"omega": find_axis_value(grid.case, "omega"), "restitution": side.restitution}
+    axes: dict[str, Any] = {name: find_axis_value(grid.case, name) for name in ("omega", "restitution")}
     axes[grid.x.name] = grid.x.values
     amplitudes: Floats = critical_amplitude(axes["omega"], axes["restitution"])
     return amplitudes
@@ -274,7 +273,7 @@ def map_point_to_texts(grid: MapGrid, x: float, y: float) -> dict[str, str]:
     blocks, factors, time_scale = _make_blocks(grid, np.array([x]), np.array([y]))
     dropped = {*list_names("start", "treatment"), "duration"}
     texts = {name: text for name, text in grid.case.texts.items() if name not in dropped}
-    if grid.names & _BLOCK_AXES:
+    if grid.names & {"p", "alpha", "restitution"}:
         texts = {name: text for name, text in texts.items() if name not in BLOCK_NAMES}
         p, alpha, restitution = blocks.p[0] / time_scale[0], blocks.alpha[0], blocks.restitution[0]
         texts |= block_to_texts(Block.from_parameters(p, alpha, restitution, gravity=blocks.gravity))

@@ -11,7 +11,7 @@ import numpy as np
 from rocking import records
 from rocking.core import checks
 from rocking.errors import MotionError, OptionError
-from rocking.explorer.parameters import PARAMETERS, PULSES, Texts, Values, clean_texts, list_names
+from rocking.explorer.parameters import PULSES, Texts, Values, list_names, read_texts
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.declared import SCALINGS
 from rocking.inputs.pulses import FAMILIES, read_pulse
@@ -35,10 +35,8 @@ class WrittenMotion(NamedTuple):
 
 def read_motion(texts: Texts, uploads: UploadStore) -> WrittenMotion:
     """Read the texts of a motion alone, as `read_case` does for a case."""
-    motion_texts = {name: text for name, text in clean_texts(texts).items() if name in list_names("motion")}
-    return read_motion_values(
-        motion_texts, {name: PARAMETERS[name].read(text) for name, text in motion_texts.items()}, uploads
-    )
+    motion_texts = {name: text for name, text in texts.items() if name in list_names("motion")}
+    return read_motion_values(*read_texts(motion_texts), uploads)
 
 
 def read_motion_values(texts: Texts, values: Values, uploads: UploadStore) -> WrittenMotion:

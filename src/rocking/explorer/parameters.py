@@ -123,15 +123,16 @@ def list_names(*groups: str) -> tuple[str, ...]:
 BLOCK_NAMES: Final = list_names("block")
 
 
-def clean_texts(texts: Texts) -> dict[str, str]:
-    """Return the texts of a case that are not empty."""
+def read_texts(texts: Texts) -> tuple[dict[str, str], dict[str, Any]]:
+    """Return the texts of a case that are not empty, by default those of `DEFAULT`, and their values."""
     nonempty = {name: value.strip() for name, value in texts.items() if value.strip()}
     for name, value in nonempty.items():
         if name not in PARAMETERS:
             raise OptionError(f"a case has no {name[:40]!r}; it has {', '.join(PARAMETERS)}")
         if len(value) > _MAX_TEXT_LENGTH:
             raise OptionError(f"{{}} is {len(value)} letters long; at most {_MAX_TEXT_LENGTH} are read", name)
-    return {"motion": DEFAULT["motion"], **nonempty} if nonempty else dict(DEFAULT)
+    nonempty = {"motion": DEFAULT["motion"], **nonempty} if nonempty else DEFAULT
+    return nonempty, {name: PARAMETERS[name].read(text) for name, text in nonempty.items()}
 
 
 def read_count(text: str, name: str, minimum: int, maximum: int) -> int:

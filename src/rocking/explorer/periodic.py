@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -144,7 +144,7 @@ def read_sweep(case: Case, texts: Texts) -> Sweep:
     sine = find_sine(case)
     name = checks.choice(texts.get("sweep") or "a", "sweep", OptionError, [*SWEPT])
     omega = sine.frequency / compute_units(case)["omega"]
-    ends = (0.9, float(f"{max(1.5, 2.5 * omega):.2g}")) if name == "a" else AXES["omega"].close
+    ends = (0.9, float(f"{max(1.5, 2.5 * omega):.2g}")) if name == "a" else AXES["omega"][1:]
     sweep = Sweep(case, sine, read_range(name, texts, ("sweep_from", "sweep_to", "sweep_points"), ends))
     require_possible(sweep.choose_sine(float(sweep.axis.values[-1])).amplitude)
     return sweep
@@ -179,11 +179,6 @@ def _describe_period(period: int, impacts: float) -> str:
     if not impacts:
         return "stays at rest"
     return f"period {period}, with complete chattering" if math.isinf(impacts) else f"period {period}"
-
-
-def describe_sweep(sweep: Sweep) -> dict[str, Any]:
-    """Describe a diagram."""
-    return {"name": sweep.axis.name, "values": sweep.axis.values.tolist()}
 
 
 def sweep_point_to_texts(sweep: Sweep, value: float, state: Sequence[float] = ()) -> dict[str, str]:

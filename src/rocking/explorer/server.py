@@ -6,15 +6,14 @@ import hmac
 import os
 import secrets
 import struct
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
-import anyio
-import anyio.to_thread
 from starlette.applications import Starlette
 from starlette.background import BackgroundTask
+from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
@@ -27,9 +26,6 @@ from rocking.explorer.parameters import field_label
 from rocking.explorer.payload import Payload, fill_page, load_english_texts, pack
 from rocking.explorer.standalone import build_page
 from rocking.explorer.uploads import MAX_FILE_SIZE, TOO_LARGE
-
-T = TypeVar("T")
-Handler = Callable[[Request], Awaitable[Response]]
 
 #: Path that exchanges the token of a link for the secret.
 EXCHANGE: Final = "/api/secret"
@@ -68,7 +64,6 @@ class App:
         self.explorer = explorer
         self._secret, self._tokens = secrets.token_urlsafe(32), list[str]()
         self._html = fill_page(FOLDER.joinpath("index.html").read_text("utf-8"), load_english_texts())
-        self._threads = anyio.CapacityLimiter(4)
         self.asgi = Starlette(
             routes=[
                 Route("/", self._send_page),
@@ -87,13 +82,12 @@ class App:
         self._tokens = [*self._tokens[-_MAX_LINKS + 1 :], secrets.token_urlsafe(32)]
         return self._tokens[-1]
 
-    async def _send_page(self, _: Request) -> Response:
+    def _send_page(self, _: Request) -> Response:
         return HTMLResponse(self._html, headers={"content-security-policy": _POLICY})
 
-    async def _send_block(self, _: Request) -> Response:
+    def _send_block(self, _: Request) -> Response:
         """Return the standalone page, which leads to this one."""
-        html = await self._run_in_thread(_build_block_page)
-        return HTMLResponse(html, headers={"content-security-policy": _BLOCK_POLICY})
+        return HTMLResponse(_build_block_page(), headers={"content-security-policy": _BLOCK_POLICY})
 
     async def _exchange(self, request: Request) -> Response:
         """Return the secret for an unused token."""
@@ -103,13 +97,13 @@ class App:
         self._tokens.remove(token)
         return PlainTextResponse(self._secret)
 
-    def _answer(self, name: str) -> Handler:
-        """Return a handler that sends the explorer's answer, computed in a thread."""
+    def _answer(self, name: str) -> Callable[[Request], Response]:
+        """Return a handler that sends the explorer's answer; Starlette runs it in a thread."""
 
-        async def respond(request: Request) -> Response:
+        def respond(request: Request) -> Response:
             if not _has_credentials(request, self._secret):
                 return _respond_problem(_LINK_REQUIRED, 403)
-            answer = await self._run_in_thread(lambda: self.explorer.answers[name](Query(request.query_params)))
+            answer = self.explorer.answers[name](Query(request.query_params))
             if isinstance(answer, Stream):
                 parts = _encode_parts(answer, request.query_params.get("motion", ""))
                 close = BackgroundTask(answer.parts.close)  # also when the reader disconnects
@@ -119,9 +113,6 @@ class App:
             return JSONResponse(to_plain(answer))
 
         return respond
-
-    async def _run_in_thread(self, compute: Callable[[], T]) -> T:
-        return await anyio.to_thread.run_sync(compute, limiter=self._threads)
 
     async def _receive_file(self, request: Request) -> Response:
         """Store the body of a request as a file, and describe it."""
@@ -138,8 +129,7 @@ class App:
         except ClientDisconnect:
             return Response(status_code=400)
         name = request.query_params.get("name", "")
-        description = await self._run_in_thread(lambda: self.explorer.add_file(name, bytes(data)))
-        return JSONResponse(to_plain(description))
+        return JSONResponse(to_plain(await run_in_threadpool(self.explorer.add_file, name, bytes(data))))
 
 
 class _PageFiles(StaticFiles):

@@ -62,20 +62,20 @@ class SimulatedCase:
         refined = self.case.simulate(chattering=_REFINED)
         return refined if refined.rests_by_rounding == self.response.rests_by_rounding else self.response
 
-    def select_response(self, start: float, end: float) -> Response:
-        """Return the response that resolves the impacts in a window."""
-        return self.refined if find_unresolved(self.response, start, end) else self.response
+    def resolve_window(self, window: tuple[float, float] | None) -> tuple[Response, float, float]:
+        """Return the response that resolves the impacts in a window, and the ends of the window, s.
 
-    def choose_window(self, window: tuple[float, float] | None) -> tuple[float, float]:
-        """Return a window, s, or by default the time of motion, also if it was chosen for a longer response."""
+        By default, and for a window beyond the response, which was chosen for a longer one, this is the time of motion.
+        """
         duration = self.response.duration
         if window is None or window[0] >= duration:
-            return compute_active_span(self.response)
-        start, end = max(window[0], 0.0), min(window[1], duration)
-        if not end - start >= _MIN_WINDOW:
-            limits = f"{_MIN_WINDOW:g} s wide, within the response from 0 to {duration:.6g} s"
-            raise OptionError(f"the window must be at least {limits}", value=window)
-        return start, end
+            start, end = compute_active_span(self.response)
+        else:
+            start, end = max(window[0], 0.0), min(window[1], duration)
+            if not end - start >= _MIN_WINDOW:
+                limits = f"{_MIN_WINDOW:g} s wide, within the response from 0 to {duration:.6g} s"
+                raise OptionError(f"the window must be at least {limits}", value=window)
+        return self.refined if find_unresolved(self.response, start, end) else self.response, start, end
 
 
 def find_unresolved(response: Response, start: float, end: float) -> list[float]:
@@ -97,16 +97,14 @@ def describe_case(shown: SimulatedCase, window: tuple[float, float] | None) -> P
     """Return the numbers of a case on the page, the sentence above them, and its lines in a window (s)."""
     case, response = shown.case, shown.response
     block, motion = case.block, case.motion
-    thresholds = block.uplift_thresholds(case.model)
-    start, end = shown.choose_window(window)
-    visible = shown.select_response(start, end)
+    visible, start, end = shown.resolve_window(window)
     marks = visible.impacts["time"][(visible.impacts["time"] >= start) & (visible.impacts["time"] <= end)]
     share = chattering_episodes(response).share_at_rest
     outline = None if case.body is None else case.body.find_outline(case.azimuth)
     header = {
         "block": {
             "sides": [vars(side) for side in block.sides],
-            "thresholds_g": [threshold / STANDARD_GRAVITY for threshold in thresholds],
+            "thresholds_g": [threshold / STANDARD_GRAVITY for threshold in block.uplift_thresholds(case.model)],
             "gravity_g": block.gravity / STANDARD_GRAVITY,
             "outline": _describe_outline(block, outline),
             "notes": [*map(str, list_block_notes(block)), *(case.body.solid.notes if case.body else ())],
@@ -146,8 +144,7 @@ def describe_outcome(response: Response) -> str:
 
 def describe_details(shown: SimulatedCase, window: tuple[float, float] | None) -> Payload:
     """Return the phase plane, the energy and the ground displacement in a window (s); times count from its start."""
-    start, end = shown.choose_window(window)
-    response = shown.select_response(start, end)
+    response, start, end = shown.resolve_window(window)
     course = sample_interval(response, start, end)
     x, y = compute_boundary(response)
     times = np.linspace(start, end, MAX_POINTS // 4)
@@ -158,8 +155,7 @@ def describe_details(shown: SimulatedCase, window: tuple[float, float] | None) -
     arrays = {
         "course_time": course.time - start, "course_rotation": course.rotation, "course_velocity": course.velocity,
         "kinetic": course.kinetic, "potential": course.potential, "jump": course.impact_rows.astype(float),
-        "boundary_x": x, "boundary_y": y, "displacement_time": times - start,
-        "displacement": moved,
+        "boundary_x": x, "boundary_y": y, "displacement_time": times - start, "displacement": moved,
         **{f"course_{kind}": found - start for kind, found in find_event_times(response, start, end).items()},
     }  # fmt: skip
     return Payload({"from": start, "needed": response._energy.overturning_energy.tolist()}, arrays)
@@ -171,7 +167,7 @@ def find_state(shown: SimulatedCase, time: str, window: tuple[float, float] | No
     if not 0.0 <= value <= duration:
         message = f"{{}} must be within the response, from 0 to {duration:.6g} s, not {value:g} s"
         raise OptionError(message, "at", value=time)
-    response = shown.select_response(*shown.choose_window(window))
+    response, *_ = shown.resolve_window(window)
     rotation, velocity, _ = response.states(value).tolist()
     motion = shown.case.motion
     components = {"ground_g": motion, "vertical_g": None if motion is None else motion.vertical}

@@ -23,7 +23,6 @@ import numpy as np
 
 from rocking import pulses
 from rocking.block import Block
-from rocking.core.arrays import Floats
 from rocking.core.constants import MODELS, STANDARD_GRAVITY, VERSION
 from rocking.engine.schemes import Certified, VelocityThreshold
 from rocking.engine.tasks import STEP_BUDGET, STEP_BUDGET_PER_PIECE, STEPS_PER_SLICE, Setup
@@ -253,6 +252,7 @@ def _describe_record(name: str) -> dict[str, Any]:
     unit = choose_unit(record.units)
     drawn = motion.processed(baseline=1, band_pass=(1.0 / MAX_DRAWN_PERIOD, None))
     displacement = drawn.displacement(np.arange(0.0, motion.duration, _DRAWN_STEP)) / _DRAWN_UNIT
+    differences = np.diff(np.rint(displacement).astype(np.int64), prepend=0)
     return {
         "title": record.title,
         "step": record.dt,
@@ -261,10 +261,5 @@ def _describe_record(name: str) -> dict[str, Any]:
         "multiplier": unit.multiplier,
         "divisor": unit.divisor,
         "pga": motion.pga,
-        "drawn": {"step": _DRAWN_STEP, "unit": _DRAWN_UNIT, "differences": _differences(displacement)},
+        "drawn": {"step": _DRAWN_STEP, "unit": _DRAWN_UNIT, "differences": differences.tolist()},
     }
-
-
-def _differences(values: Floats) -> list[int]:
-    numbers: list[int] = np.diff(np.rint(values).astype(np.int64), prepend=0).tolist()
-    return numbers

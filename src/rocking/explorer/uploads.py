@@ -23,8 +23,7 @@ from rocking.solid.mesh import SHIPPED_MESHES
 
 #: Largest file, bytes: twenty times a long record of three channels.
 MAX_FILE_SIZE: Final = 16 * 2**20
-_LIMIT: Final = f"{MAX_FILE_SIZE // 2**20} MiB"
-TOO_LARGE: Final = f"a file may be {_LIMIT} large: cut a record into smaller files, or make a mesh coarser"
+TOO_LARGE: Final = f"a file may have {MAX_FILE_SIZE // 2**20} MiB: cut a record into smaller files, or coarsen a mesh"
 
 #: Maximum number of files, forty stations of three components, and their bytes. Further records are rejected, so that
 #: none disappears unnoticed.

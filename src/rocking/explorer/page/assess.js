@@ -89,7 +89,7 @@ export class View {
     one("assessed").hidden = false;
     this.chart.show({x: {low: 0, high: 1.02 * levels[levels.length - 1] * scale, label: `${label} (${unit})`}, y: {low: -0.03, high: 1.03, label: "probability of overturning"}, layers: [
       ...(lower ? [{class: "band", area: [across, lower, upper]}] : []), ...(at ? [{class: "line accent", line: [across, probability]}] : []), {class: "dot ink", dots: [by(levels), share]},
-    ], legend: [["line accent", "line", "fitted lognormal"], ["band", "area", "confidence band, 90 %"], ["dot ink", "dot", "share of simulations"]]});
+    ], legend: [...(at ? [["line accent", "line", "fitted lognormal"]] : []), ...(lower ? [["band", "area", "confidence band, 90 %"]] : []), ["dot ink", "dot", "share of simulations"]]});
     one("statements").replaceChildren(...[...statements, ...failures.map((/** @type {string} */ each) => `Not assessed: ${each}`)].map((text) => make("li", {}, [text])));
     this.render();
   }
@@ -109,7 +109,7 @@ export class View {
     one("records").replaceChildren(
       make("thead", {}, [make("tr", {}, [make("td"), ...COLUMNS.map(([words], k) => make("th", {scope: "col", "aria-sort": this.order?.[0] === k ? (this.order[1] ? "ascending" : "descending") : null}, [make("button", {type: "button", class: "link", id: `sort-${k}`, on: {click: () => sort(k)}}, [words])])),
         ...(withResults ? RESULTS : []).map((words) => make("th", {scope: "col"}, [words])), make("td")])]),
-      ...groups.map((/** @type {any} */ group) => make("tbody", {}, [this.head(group), ...group.rows.map((/** @type {Row} */ row) => this.row(row, withResults))])));
+      ...groups.map((/** @type {any} */ group) => make("tbody", {}, [this.head(group, withResults), ...group.rows.map((/** @type {Row} */ row) => this.row(row, withResults))])));
     if (focus) document.getElementById(focus)?.focus({preventScroll: true});
     const {files = 0, most_files: most = 0, bytes = 0, most_bytes: size = 0} = list.usage, chosen = list.rows().filter((/** @type {Row} */ row) => list.has(row)).length;
     one("assess").textContent = `Assess over ${counted(chosen, "record")}`;
@@ -117,10 +117,10 @@ export class View {
     one("missing").replaceChildren(...questions(list.rows(), (rows, name, value) => void this.page.answer(rows, name, value)));
   }
 
-  /** @param {any} group */
-  head({title, reason, rows}) {
+  /** @param {any} group @param {boolean} withResults */
+  head({title, reason, rows}, withResults) {
     const [{key}] = rows;
-    return make("tr", {class: "station"}, [make("th", {scope: "rowgroup", colspan: 6}, [title, ...(reason ? [make("small", {}, [` ${reason}`])] : []),
+    return make("tr", {class: "station"}, [make("th", {scope: "rowgroup", colspan: COLUMNS.length + 2 + (withResults ? RESULTS.length : 0)}, [title, ...(reason ? [make("small", {}, [` ${reason}`])] : []),
       ...(key ? [" ", make("button", {type: "button", class: "link", "aria-label": `Remove ${title}`, on: {click: () => this.remove(rows)}}, ["remove"])] : [])])]);
   }
 

@@ -7,10 +7,10 @@ import {specification, writeAddress} from "./state.js";
 import {amongst, joined, short, typed} from "./numbers.js";
 import {known, labelOf, phrase} from "./texts.js";
 import {axisUnit} from "./units.js";
-import {isTyped, optionsOf} from "./forms.js";
+import {choose, isTyped, optionsOf} from "./forms.js";
 import {csv, offer} from "./save.js";
 
-/** Colours of the first outcome, the final fate and the verdict of a study; orange is overturning, and nothing else. */
+/** Colours of the first outcome, the final outcome and the verdict of a study; orange is overturning, and nothing else. */
 export const OUTCOMES = ["#ffffff", "#c9dcf0", "#7fa3cf", "#1d3f73", "#d4660f", "#b0b0b0"];
 export const MODES = /** @type {[number, string][]} */ ([[-3, "#ffffff"], [-1, "#c9dcf0"], [-2, "#7fa3cf"], [0, "#5e2404"], [1, "#b0480a"], [2, "#f08c2e"], [-4, "#ffc58a"]]);
 export const VERDICTS = /** @type {[number, string][]} */ ([[0, "#c9dcf0"], [1, "#d4660f"], [-1, "#b0b0b0"]]);
@@ -93,6 +93,7 @@ export class View {
     const label = (/** @type {string} */ name) => { const axis = all.find((each) => each.name === name); return axis.unit ? `${labelOf(axis)} (${axisUnit(axis.unit)[1]})` : labelOf(axis); };
     one("quantity").replaceChildren(...optionsOf((this.study ? this.study.quantities : specification.quantities).map((/** @type {string} */ name) => [name, phrase(`quantity.${name}`)])));
     one("quantity").value = this.quantity;
+    if (!this.study) choose(one("points"), String(this.about.x.values.length));
     for (const which of ["x", "y"]) {
       const {name, values} = this.about[which];
       one(which).replaceChildren(...optionsOf(axes.filter((each) => this.study || which === "y" || !["a", "pga"].includes(each)).map((each) => [each, label(each)])));
