@@ -57,7 +57,7 @@ def test_a_block_is_the_same_from_a_command_a_page_a_file_and_a_table(tmp_path, 
     assert (sides(body), body.mass) == (sides(block), block.mass)
     if {*without_mass} <= PARAMETERS.keys():
         case = read_case({**without_mass, "motion": "none", "duration": "1"}, UploadStore())
-        assert sides(case.block) == sides(block) == sides(eval(case.block_call, {"Block": Block}))
+        assert sides(case.block) == sides(block) == sides(eval(case.block_expression, {"Block": Block}))
     whole = Blocks.from_bodies([block])
     columns = {}
     for name, text in texts.items():
