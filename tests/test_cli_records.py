@@ -430,3 +430,16 @@ def test_a_coefficient_of_friction_is_put_to_the_test(run):
     times = [row["sliding_time_s"] for row in json.loads(out)["records"]]
     assert 230.0 < times[0] < 240.0
     assert run("simulate", both[0], "--width", 0.24, "--height", 1.1, "--available-friction", -1)[0] == 2
+
+
+def test_a_floor_moves_as_its_building(run):
+    out = run("simulate", RECORD, *BLOCK, "--floor", "period=0.4,damping=0.05", "--pga", "0.5g", "--json")[1]
+    floor = rocking.records.load(RECORD).on_floor(0.4, 0.05)
+    response = rocking.simulate(rocking.Block(width=0.24, height=1.1), floor.scaled_to(0.5 * GRAVITY, Measure("pga")))
+    assert json.loads(out)["peak_rotation_rad"] == response.peak_rotation
+    for text, sentence in (
+        ("perod=1", "--floor has no perod; did you mean period?"),
+        ("period=0", "--floor: period must be a positive number, in s, not 0"),
+        ("0.4,0.05", "--floor must be NAME=VALUE pairs separated by commas, with distinct names; got '0.4,0.05'"),
+    ):
+        assert run("simulate", RECORD, *BLOCK, "--floor", text)[2].splitlines()[-1] == f"rocking: {sentence}"

@@ -259,10 +259,12 @@ class FileOptions(InputOptions):
         return read_scaling(texts, read_positive_acceleration)
 
     def _scale_motion(self, name: str, motion: Motion, target: tuple[float, Measure] | None) -> Motion:
-        """Return the scaled motion, with notes."""
+        """Return the scaled motion, of the floor if there is one, with notes."""
         notes = list_motion_notes(motion)
         for sentence in (*notes, *list_vertical_notes(motion)):
             note(f"{name}: {sentence}")
+        if (floor := self.supplied_texts().get("floor")) is not None:
+            motion = bodies.create_from_pairs(motion.on_floor, floor, "floor")
         if target is None:
             return motion
         scaled = motion.scaled_to(*target)
@@ -286,7 +288,7 @@ class FileOptions(InputOptions):
         return {name: self._scale_motion(name, motion, self._read_target()) for name, motion in named}
 
 
-@_with_inputs("vertical", "scale", "pga", "pgv", "sa", "pulse")
+@_with_inputs("vertical", "floor", "scale", "pga", "pgv", "sa", "pulse")
 class ScaledPulseOptions(FileOptions):
     """One record at a time, or pulses, scaled."""
 
@@ -409,12 +411,12 @@ class _RecordOptions(FileOptions):
         return motions | {f"{name} x -1": -motion for name, motion in motions.items()} if self.reversed else motions
 
 
-@_with_inputs("vertical", "pulse", "stochastic")
+@_with_inputs("vertical", "floor", "pulse", "stochastic")
 class UnscaledOptions(_RecordOptions):
     """Several records and pulses with vertical motions, scaled by the analysis itself."""
 
 
-@_with_inputs("vertical", "scale", "pga", "pgv", "sa", "pulse", "stochastic")
+@_with_inputs("vertical", "floor", "scale", "pga", "pgv", "sa", "pulse", "stochastic")
 class MotionOptions(_RecordOptions):
     """Several records and pulses, scaled."""
 

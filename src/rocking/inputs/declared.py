@@ -211,6 +211,9 @@ INPUTS: Final = index_by_name(
         "Degree of the polynomial that is subtracted from records (0: the mean), or none. By default 0 for counts of "
         "instruments (K-NET), none for others."),
     Input("highpass", "motion", "frequency", "Corner frequency of a high-pass filter of records, 0.1 (Hz)."),
+    Input("floor", "", "text",
+        "Floor of a linear building whose motion shakes the block, as period=0.4,damping=0.05 (s, fraction of critical "
+        "damping); scaling and measures then refer to the motion of the floor."),
     Input("scale", "motion", "number", "Factor on the motion; negative: reversed.", "", "1", 0.1, 10.0, True),
     Input("pga", "motion", "acceleration", "Scale to this peak ground acceleration: 0.5g, 4.9m/s2 or 4.9 (m/s^2).",
         "g", "0.4g", 0.05, 2.0, True),
