@@ -19,7 +19,7 @@ Pair = tuple[float, float]
 def is_complete(motion: rocking.Motion, thresholds: Pair, rest: float, *, uplift: float = 0.0, rests: int = 1) -> bool:
     block = rocking_block()
     block["threshold"] = thresholds
-    state = state_of(AT_REST, 0.0, 0.0, rests=rests, first_uplift=uplift, first_rest=rest)
+    state = state_of(AT_REST, 0.0, 0.0, rest_count=rests, first_uplift=uplift, first_rest=rest)
     blocks, states = create_structs(1, block.dtype), create_structs(1, state.dtype)
     blocks[0], states[0] = block, state
     complete = np.zeros(1, dtype=bool)

@@ -177,4 +177,4 @@ def test_an_impact_slows_down_and_enters_the_next_side(entered: tuple[int, int],
         speed = apply_impact(block, hit)
         assert speed == max(0.0, -v)
         assert (hit["side"], hit["u"], hit["v"]) == (entered[side], 0.0, (0.5, 0.8)[side] * speed)
-        assert hit["impacts"] == 1
+        assert hit["impact_count"] == 1

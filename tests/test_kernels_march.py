@@ -90,8 +90,8 @@ def run(
     while status == state.MarchStatus.FULL and len(table) < 200_000:
         table = state.enlarge_table(table)
         status = march(ground, block, rules, table, scratch, at)
-    nodes = table["node"][: at["nodes"]].copy()
-    kept = (table[name][: at[name + "s"] if keep else 0] for name in ("impact", "event", "sequence"))
+    nodes = table["node"][: at["node_count"]].copy()
+    kept = (table[name][: at[name + "_count"] if keep else 0] for name in ("impact", "event", "sequence"))
     return Run(status, nodes, *kept, at, Trail(ground, block, rules, state.expose_fields(nodes)))
 
 
@@ -141,7 +141,7 @@ def test_a_march_writes_into_its_table_and_never_behind_it(nonlinear: bool, colu
     whole = run(ground, nonlinear=nonlinear)
     assert len(whole.sequences) > 0
     assert max(whole.sequences["impacts"]) > 10
-    for size in range(max(whole.at["nodes"], whole.at["impacts"]) + 6):
+    for size in range(max(whole.at["node_count"], whole.at["impact_count"]) + 6):
         table, at = state.create_table(size + 5), started()
         table.view(np.uint8)[:] = 0xA5
         guard = table[size:].tobytes()
@@ -158,8 +158,8 @@ def test_a_march_writes_into_its_table_and_never_behind_it(nonlinear: bool, colu
             status = march(ground, block, rules, table[:size], scratch, at)
             assert table[size:].tobytes() == guard
         assert (status, at) == (whole.status, whole.at)
-        assert_array_equal(table["node"][: at["nodes"]], whole.nodes)
-        assert_array_equal(table["impact"][: at["impacts"]], whole.impacts)
+        assert_array_equal(table["node"][: at["node_count"]], whole.nodes)
+        assert_array_equal(table["impact"][: at["impact_count"]], whole.impacts)
 
 
 @pytest.mark.parametrize("nonlinear", [False, True])
@@ -173,9 +173,9 @@ def test_a_march_in_slices_is_the_march_in_one(nonlinear: bool, budget: int) -> 
         at["budget"] = budget
         pauses += 1
     assert pauses > 1
-    assert_array_equal(table["impact"][: at["impacts"]], whole.impacts)
-    assert_array_equal(table["event"][: at["events"]], whole.events)
-    assert_array_equal(table["node"][: at["nodes"]], whole.nodes)
+    assert_array_equal(table["impact"][: at["impact_count"]], whole.impacts)
+    assert_array_equal(table["event"][: at["event_count"]], whole.events)
+    assert_array_equal(table["node"][: at["node_count"]], whole.nodes)
 
 
 @pytest.mark.parametrize("nonlinear", [False, True])
@@ -190,8 +190,8 @@ def test_a_march_from_piece_to_piece_is_the_march_in_one(nonlinear: bool) -> Non
         assert status == (state.MarchStatus.RUNNING if is_stopped else whole.status)
         if status != state.MarchStatus.RUNNING:
             break
-    assert_array_equal(table["impact"][: at["impacts"]], whole.impacts)
-    assert_array_equal(table["event"][: at["events"]], whole.events)
+    assert_array_equal(table["impact"][: at["impact_count"]], whole.impacts)
+    assert_array_equal(table["event"][: at["event_count"]], whole.events)
     assert at["peak"] == whole.at["peak"]
 
 
@@ -206,7 +206,7 @@ def test_recording_or_not_gives_the_same_bits(nonlinear: bool, columns: int) -> 
         state_alone = run(ground, nonlinear=nonlinear, rows=0, keep=False)
         assert kept.status == state_alone.status
         for name in state.STATE_DTYPE.names:
-            if name not in ("nodes", "budget"):
+            if name not in ("node_count", "budget"):
                 assert kept.at[name] == state_alone.at[name], name
 
 

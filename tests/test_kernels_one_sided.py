@@ -170,7 +170,7 @@ def test_the_bracket_of_a_body_that_bounces_on_one_side_holds_its_rest(make, exa
 def test_a_march_of_a_ball_without_a_table_of_rows_is_the_same() -> None:
     ground = sine_table(0.4, 3.0, 3.0, 0.02)
     kept, alone = thrown(ground, ball(0.9), 0.5), run(ground, block=ball(0.9), velocity=0.5, rows=0, keep=False)
-    for name in ("peak", "peak_time", "impacts", "rests", "last_rest_time", "end_time"):
+    for name in ("peak", "peak_time", "impact_count", "rest_count", "last_rest_time", "end_time"):
         assert kept.at[name] == alone.at[name]
 
 

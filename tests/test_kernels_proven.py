@@ -63,9 +63,9 @@ def test_a_rest_within_the_piece_is_that_of_the_impacts_taken_one_by_one() -> No
 
 def test_impacts_are_passed_down_to_the_speed_that_is_worth_a_proof() -> None:
     found = passed(STEADY, proven(1e-3))
-    assert found["impacts"] > 30
-    assert found["proven_impacts"] == found["impacts"] + 1
-    assert found["budget"] == 10**6 - found["impacts"]
+    assert found["impact_count"] > 30
+    assert found["proven_impacts"] == found["impact_count"] + 1
+    assert found["budget"] == 10**6 - found["impact_count"]
     assert 1e-5 < found["v"] < 1.2e-5
     assert found["last_impact_time"] == found["offset"]
 
@@ -74,9 +74,9 @@ def test_a_peak_among_proven_impacts_is_not_lost() -> None:
     """An arc that might be the highest so far is left to a closer look; the first of them ends the passing."""
     v, g = 1e-3, 4.0 * (0.15 + 0.02)
     height = v * v / (2.0 * g)
-    assert passed(STEADY, proven(v, peak=0.5 * height))["impacts"] == 0
-    assert passed(STEADY, proven(v, peak=1.01 * height))["impacts"] == 0  # is not seen at a glance
-    assert passed(STEADY, proven(v, peak=5.0 * height))["impacts"] > 30
+    assert passed(STEADY, proven(v, peak=0.5 * height))["impact_count"] == 0
+    assert passed(STEADY, proven(v, peak=1.01 * height))["impact_count"] == 0  # is not seen at a glance
+    assert passed(STEADY, proven(v, peak=5.0 * height))["impact_count"] > 30
 
 
 def test_the_peak_of_a_response_may_lie_within_a_proven_sequence() -> None:
@@ -89,15 +89,15 @@ def test_the_peak_of_a_response_may_lie_within_a_proven_sequence() -> None:
 
 def test_nothing_is_passed_beyond_the_end_of_the_piece() -> None:
     flight = 2.0 * 1e-3 / (4.0 * 0.17)
-    assert passed(STEADY, proven(1e-3), left=0.99 * flight)["impacts"] == 0
+    assert passed(STEADY, proven(1e-3), left=0.99 * flight)["impact_count"] == 0
     found = passed(STEADY, proven(1e-3), left=1.01 * flight)
-    assert found["impacts"] == 1
+    assert found["impact_count"] == 1
     assert found["offset"] == pytest.approx(flight, rel=1e-2)
 
 
 def test_a_turn_passes_no_more_impacts_than_every_table_has_space_for() -> None:
     found = passed(STEADY, proven(1e-3), e=0.99)
-    assert found["impacts"] == found["nodes"] == PROVEN_PER_ITERATION
+    assert found["impact_count"] == found["node_count"] == PROVEN_PER_ITERATION
     assert not has_space(rules_for(), state.create_table(PROVEN_PER_ITERATION + 2), proven(1e-3))
     assert has_space(rules_for(), state.create_table(PROVEN_PER_ITERATION + 3), proven(1e-3))
 
@@ -112,5 +112,5 @@ def test_a_table_that_is_full_within_a_proven_sequence_changes_no_bit() -> None:
 
 
 def test_not_a_number_passes_nothing() -> None:
-    assert passed(STEADY, proven(math.nan))["impacts"] == 0
-    assert passed(in_units_of_g([0.0, 9.0], [[math.nan, 0.0]]), proven(1e-3))["impacts"] == 0
+    assert passed(STEADY, proven(math.nan))["impact_count"] == 0
+    assert passed(in_units_of_g([0.0, 9.0], [[math.nan, 0.0]]), proven(1e-3))["impact_count"] == 0

@@ -209,6 +209,6 @@ def test_the_variation_along_an_arc_is_the_derivative_by_what_is_changed(
         expected = derivative(of_this, system, (u, v, du, dv), (1 - 2 * side) * push, lift, order)
         terms = [x * mp.mpf(h) ** k for k, x in enumerate(expected)]
         for k in range(order + 1):
-            assert abs(work["change"][k] * h**k - terms[k]) <= 64.0 * ULP * (1.0 + max(map(abs, terms)))
+            assert abs(work["rotation"][k] * h**k - terms[k]) <= 64.0 * ULP * (1.0 + max(map(abs, terms)))
         judged += order
     assert judged > 8 * arcs

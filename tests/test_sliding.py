@@ -239,7 +239,7 @@ def bracket_by_kernel(case: Sequence) -> tuple[float, float] | None:
     start["slip_rate"], start["peak"], start["budget"] = 2.0 * case.direction, math.inf, 100_000
     start["certificate_speed"] = math.inf
     march(prepare_ground(None, bodies.gravity), run.structs[0], run.settings, table, state.create_scratch(), start)
-    if not start["sequences"] or not table["sequence"]["upper"][0] >= 0.0:
+    if not start["sequence_count"] or not table["sequence"]["upper"][0] >= 0.0:
         return None
     return float(table["sequence"]["lower"][0]), float(table["sequence"]["upper"][0])
 

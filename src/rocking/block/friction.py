@@ -101,7 +101,11 @@ def add_friction(structs: Structs, bodies: Bodies, model: Model, friction: tuple
         "this restitution would gain energy in a slip, so that {} requires another one; omit the restitution",
     )
     structs["has_friction"], structs["static_friction"], structs["kinetic_friction"] = True, static, kinetic
-    structs["arm"], structs["pivot_distance"], structs["height"] = arm / g, base / g, height[:, 0] / g
+    structs["arm_over_g"], structs["pivot_distance_over_g"], structs["height_over_g"] = (
+        arm / g,
+        base / g,
+        height[:, 0] / g,
+    )
     structs["inertia_ratio"] = ratio / (1.0 - ratio)
     s, c = (bodies.alpha, 1.0) if is_linear else (structs["sine"], structs["cosine"])
     lost = 0.0 if is_linear else ratio * s

@@ -21,7 +21,7 @@ from rocking.core.constants import MODELS, Model
 from rocking.errors import BlockError, OptionError
 
 #: Number of rotations in the search for the balance on each side.
-_N_SAMPLES: Final = 512
+_SAMPLE_COUNT: Final = 512
 
 _RESTRAINT_NAMES: Final = "Tendon, Spring, Damper, Thrust or Load"
 _ROTATION: Final = CoordinateLabels("rotation", "angular_velocity", "angular_acceleration", "rad", "balance")
@@ -188,16 +188,16 @@ class RestrainedBlock(BlockBase):
 
     def _compute_contact_forces(
         self,
-        motion: tuple[Floats, Floats, Floats],
+        kinematics: tuple[Floats, Floats, Floats],
         ground_over_g: tuple[Floats, Floats],
         side: Integers,
         elongation: Floats,
     ) -> tuple[Floats, Floats]:
-        horizontal, vertical = self.block.contact_law(motion, ground_over_g, side, elongation)
+        horizontal, vertical = self.block.contact_law(kinematics, ground_over_g, side, elongation)
         if self.restraints and self.block.mass is not None:
             pivots, weight = _create_pivots(self.block, self.lean, self.restraints), self.block.mass * self.gravity
             for restraint in self.restraints:
-                force_x, force_z = restraint._compute_force(pivots, motion[0], side, elongation)
+                force_x, force_z = restraint._compute_force(pivots, kinematics[0], side, elongation)
                 horizontal, vertical = horizontal - force_x / weight, vertical - force_z / weight
         if self.is_one_sided:
             horizontal = np.where(side < 0, np.minimum(horizontal, 0.0), horizontal)
@@ -306,7 +306,7 @@ def _compute_balance(side: Side, terms: RestraintTerms) -> float:
         tendon = (terms.prestress + terms.tendon_stiffness * elongation) * math.cos(0.5 * u)
         return (1.0 + terms.sine_coefficient) * sine + terms.cosine_coefficient * cosine + tendon + terms.spring * u
 
-    rotations = np.linspace(0.0, 0.5 * math.pi, _N_SAMPLES)
+    rotations = np.linspace(0.0, 0.5 * math.pi, _SAMPLE_COUNT)
     values = np.array([moment(u) for u in rotations.tolist()])
     negative = np.flatnonzero(values[1:] <= 0.0)
     if not len(negative):

@@ -495,7 +495,7 @@ class Block(BlockBase):
 
     def contact_law(
         self,
-        motion: tuple[Floats, Floats, Floats],
+        kinematics: tuple[Floats, Floats, Floats],
         ground_over_g: tuple[Floats, Floats],
         side: Integers,
         elongation: Floats,
@@ -506,13 +506,14 @@ class Block(BlockBase):
         pivot, where R is the `arm` of the side if it has one. The forces are m (a + x'') and m (g + a_v + y''), at
         rest m (a, g + a_v).
         """
-        side_index, (rotation, velocity, acceleration) = np.maximum(side, 0), motion
+        side_index, (rotation, velocity, acceleration) = np.maximum(side, 0), kinematics
         sides = [(item.alpha, item.radius if item.arm is None else item.arm) for item in self.sides]
         alpha, arm = np.array(sides).T[:, side_index]
         sign, arm_over_g = np.where(side < 0, 0.0, 1.0 - 2.0 * side_index), arm / self.gravity
-        psi, towards_pivot, speed = alpha - np.abs(rotation), sign * acceleration, np.abs(sign) * velocity**2
-        horizontal = sign * arm_over_g * (np.cos(psi) * towards_pivot + np.sin(psi) * speed)
-        vertical = arm_over_g * (np.sin(psi) * towards_pivot - np.cos(psi) * speed)
+        psi = alpha - np.abs(rotation)
+        signed_acceleration, squared_rate = sign * acceleration, np.abs(sign) * velocity**2
+        horizontal = sign * arm_over_g * (np.cos(psi) * signed_acceleration + np.sin(psi) * squared_rate)
+        vertical = arm_over_g * (np.sin(psi) * signed_acceleration - np.cos(psi) * squared_rate)
         return ground_over_g[0] + horizontal, 1.0 + ground_over_g[1] + vertical
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:

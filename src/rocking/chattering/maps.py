@@ -330,7 +330,7 @@ def _simulate_point(point: SimulationInput) -> _MapPoint:
         results["first_rest"], results["rests_by_rounding"] = upper, math.isnan(upper)
         if not math.isnan(upper):
             states, trail = state.create_states(1, 0), response.solution.trail
-            states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, upper
+            states["rest_count"], states["first_uplift"], states["first_rest"] = rests, uplift, upper
             grounds, factors = join_grounds([trail.ground]), np.array([trail.ground.factor])
             blocks, index = np.array([trail.block]), np.zeros(1, dtype=np.int64)
             results["complete_chattering"] = detect_complete_chattering(grounds, index, factors, blocks, states)

@@ -232,7 +232,7 @@ class _BranchWalk:
         return ""
 
     def shorten(self) -> None:
-        """Halve a step that failed, and struct its length unless the branch bends."""
+        """Halve a step that failed, and record its length unless the branch bends."""
         # After a longer step a distant point may belong to another branch.
         if not (self.is_bent and self.step > 1e-3):
             self.distance_to_end, self.successes = self.step, 0

@@ -290,7 +290,7 @@ class StroboscopicMap(PeriodicallyForcedBody):
         """Return states after a number of periods, the `PeriodOutcome` of each, and the numbers of resolved impacts."""
         pairs, structs = self._to_structs(states)
         self._iterate(structs, checks.integer(period_count, "period_count", OptionError, minimum=1))
-        outcomes, impacts = (np.array(structs[name]).reshape(pairs.shape[:-1]) for name in ("status", "impacts"))
+        outcomes, impacts = (np.array(structs[name]).reshape(pairs.shape[:-1]) for name in ("status", "impact_count"))
         return self._from_structs(structs).reshape(pairs.shape), outcomes, impacts
 
     def derivative(self, states: ArrayLike, period_count: int = 1) -> tuple[Floats, Floats]:

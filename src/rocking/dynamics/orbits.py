@@ -374,14 +374,14 @@ class _OrbitSearch:
         strobe = self.strobe
         restitution = float(np.max(strobe.bodies.restitution))
         gain = restitution / max(1.0 - restitution, 1e-300)
-        push = self.period_count * strobe.forcing_period * estimate_mean_acceleration(strobe.motion)
-        speed = min(max(gain, _MIN_GAIN), _MAX_GAIN) * push or self.scale.velocity
+        speed_gain = self.period_count * strobe.forcing_period * estimate_mean_acceleration(strobe.motion)
+        speed = min(max(gain, _MIN_GAIN), _MAX_GAIN) * speed_gain or self.scale.velocity
         struct = strobe._body_structs[0]
         if not math.isinf(min(strobe.body.balance)):
-            return min(speed, _MAX_BLOCK_SPEED * self.scale.velocity + push)
+            return min(speed, _MAX_BLOCK_SPEED * self.scale.velocity + speed_gain)
         if float(struct["stiffness"][0]) == 0.0:  # the flight time of a ball is proportional to its speed
             pull = float(struct["restoring_gain"][0] * struct["threshold"][0])
-            return min(speed, 0.5 * self.period_count * strobe.forcing_period * pull + push)
+            return min(speed, 0.5 * self.period_count * strobe.forcing_period * pull + speed_gain)
         return speed
 
     def _are_admissible(self, states: Floats) -> Flags:

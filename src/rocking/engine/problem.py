@@ -59,7 +59,10 @@ def prepare_grounds(motions: tuple[Motion, ...], gravity: float) -> list[GroundG
     grounds = [prepare_ground(motion, gravity) for motion in motions]
     steps = np.array([find_common_step(motion) or 0.0 for motion in motions])
     layouts = np.array(
-        [(item.columns, item.stretches.shape[1], step > 0.0) for item, step in zip(grounds, steps, strict=True)]
+        [
+            (item.coefficient_count, item.stretches.shape[1], step > 0.0)
+            for item, step in zip(grounds, steps, strict=True)
+        ]
     )
     groups = []
     for layout in np.unique(layouts, axis=0):
@@ -215,8 +218,8 @@ def build_settings(
             )
     else:
         duration = checks.positive(duration, "duration", OptionError, "s")
-    stop = math.inf if duration is None else duration
-    fields = (model == "nonlinear", scheme.code, scheme.bracket_width, stop, duration is None, writes_tables)
+    stop_time = math.inf if duration is None else duration
+    fields = (model == "nonlinear", scheme.code, scheme.bracket_width, stop_time, duration is None, writes_tables)
     return state.expose_fields(np.array([fields], dtype=state.SETTINGS_DTYPE))[0]
 
 

@@ -357,8 +357,8 @@ def _collect_outcomes(states: Structs, motion_end: Floats) -> NDArray[np.void]:
     is_undecided = (states["status"] == state.MarchStatus.DONE) | (states["status"] == state.MarchStatus.BALANCED)
     outcomes["ended_early"] = is_undecided & is_early
     for name, field in (
-        ("peak_rotation", "peak"), ("peak_time", "peak_time"), ("impacts", "impacts"), ("uplifts", "uplifts"),
-        ("rests", "rests"), ("time_at_rest", "time_at_rest"), ("first_uplift", "first_uplift"),
+        ("peak_rotation", "peak"), ("peak_time", "peak_time"), ("impacts", "impact_count"), ("uplifts", "uplift_count"),
+        ("rests", "rest_count"), ("time_at_rest", "time_at_rest"), ("first_uplift", "first_uplift"),
         ("first_rest", "first_rest"), ("last_rest", "last_rest_time"), ("rests_by_rounding", "rests_by_rounding"),
         ("duration", "end_time"),
     ):  # fmt: skip

@@ -160,7 +160,7 @@ def describe_computation(names: Sequence[str] = RECORDS) -> dict[str, Any]:
         "templates": _build_templates(),
         "statuses": _list_codes(state.MarchStatus),
         "events": _list_codes(state.EventKind),
-        "ground": {"first": sample.first, "stretch": ground.PIECES_PER_STRETCH, "unit": sample.unit},
+        "ground": {"first": sample.first_column, "stretch": ground.PIECES_PER_STRETCH, "unit": sample.g_per_unit},
         "budget": {"slice": STEPS_PER_SLICE, "total": STEP_BUDGET, "per_piece": STEP_BUDGET_PER_PIECE},
         "pulses": {name: _describe_pulse(getattr(pulses, name.replace("-", "_"))(1.0, 1.0)) for name in PULSES},
         "records": {name: _describe_record(name) for name in names},

@@ -174,7 +174,7 @@ def prove_rest(ground: Ground, block: Struct, settings: Struct, scratch: Struct,
         return create_failed_proof()
     write_local_series(ground, state.piece, state.offset, 1.0, clear_lowest_coefficients(scratch.ground))
     write_weight_series(ground, state.piece, state.offset, clear_lowest_coefficients(scratch.weight))
-    horizon = Horizon(motion_bounds, ground_error(ground), ground.columns, upper, height, drag)
+    horizon = Horizon(motion_bounds, ground_error(ground), ground.coefficient_count, upper, height, drag)
     side_i = fit_restoring_parabola(block, settings, i, scratch, horizon)
     side_j = fit_restoring_parabola(block, settings, j, scratch, horizon)
     if block.variable_restitution:
@@ -207,9 +207,9 @@ def sticks_until_rest(
     strength = compute_norm(bound_weight_magnitude(vertical), bound_magnitude(horizontal)) * (1.0 + ROUNDING)
     mu = block.static_friction * (1.0 - ROUNDING)
     for side in range(2):
-        ratio = block.arm[side] * block.stiffness[side]
+        ratio = block.arm_over_g[side] * block.stiffness[side]
         # Change of the forces by a finite size of the arcs.
-        change = block.arm[side] * (2.0 * block.stiffness[side] * strength * height + max_squared_speed)
+        change = block.arm_over_g[side] * (2.0 * block.stiffness[side] * strength * height + max_squared_speed)
         if not find_sticking_friction(block, side) <= mu:
             return False
         s, c = block.slenderness[side], 1.0
@@ -272,10 +272,13 @@ def prove_slide(ground: Ground, block: Struct, settings: Struct, scratch: Struct
     if settings.nonlinear:
         divisor = compute_sliding_divisor(block, i, direction, max_height)
         divisor = min(divisor, compute_sliding_divisor(block, j, -direction, max_height))
-    arm, base = max(block.arm[0], block.arm[1]), max(block.pivot_distance[0], block.pivot_distance[1])
+    arm, base = (
+        max(block.arm_over_g[0], block.arm_over_g[1]),
+        max(block.pivot_distance_over_g[0], block.pivot_distance_over_g[1]),
+    )
     normal = (1.0 + motion.vertical.high) / min(1.0, divisor)
     along_arcs = mu * normal + bound_magnitude(motion.horizontal) + arm * (3.0 * max_restoring + max_speed * max_speed)
-    at_impacts = 2.0 * (mu * base + block.height) * max_restoring
+    at_impacts = 2.0 * (mu * base + block.height_over_g) * max_restoring
     if not upper * (along_arcs + at_impacts) < abs(state.slip_rate):
         return create_failed_proof()
     return Proof(lower, upper, min(max(time, lower), upper), height)
@@ -311,8 +314,8 @@ def bound_sliding_side(
         norm = compute_norm(1.0, block.kinetic_friction)
         divisor = compute_sliding_divisor(block, side, direction, height)
         stiffness *= norm * (divisor + block.inertia_ratio[side] * norm) / (divisor * divisor)
-        inertia = block.arm[side] * speed * speed
-        if not (divisor > 0.0 and 2.0 * (g + stiffness * height) * block.arm[side] * height <= 0.1):
+        inertia = block.arm_over_g[side] * speed * speed
+        if not (divisor > 0.0 and 2.0 * (g + stiffness * height) * block.arm_over_g[side] * height <= 0.1):
             return RestoringBounds(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
     gain = 1.2 * (g + stiffness * height) * (1.0 + ROUNDING)
     return RestoringBounds(
@@ -351,7 +354,7 @@ class Horizon(NamedTuple):
 
     motion: MotionBounds  # bounds on the motion
     error: float  # error of the motion
-    columns: int  # number of coefficients of a piece of the motion
+    coefficient_count: int  # number of coefficients of a piece of the motion
     window: float  # length of the window
     height: float  # largest rotation
     drag: float  # largest acceleration by damping
@@ -398,7 +401,7 @@ def fit_restoring_parabola(block: Struct, settings: Struct, j: int, scratch: Str
         curvature += 0.25 * block.prestress[j]
         error = bound_restoring_error(lam * (error + weight_error) + horizon.drag, change, curvature, horizon.height)
     g = gain * (threshold * W[0] + block.restraint_threshold[j] + sign * A[0])
-    rate, half_curvature = gain * (sign * A[1]), gain * (sign * A[2]) if horizon.columns > 2 else 0.0
+    rate, half_curvature = gain * (sign * A[1]), gain * (sign * A[2]) if horizon.coefficient_count > 2 else 0.0
     if weight_changes:
         rate += gain * threshold * W[1]
         half_curvature += gain * threshold * W[2]
@@ -409,7 +412,7 @@ def fit_restoring_parabola(block: Struct, settings: Struct, j: int, scratch: Str
 def bound_higher_terms(A: Floats, horizon: Horizon) -> float:
     """Bound the terms of a polynomial beyond degree 2."""
     total = 0.0
-    for k in range(horizon.columns - 1, 2, -1):
+    for k in range(horizon.coefficient_count - 1, 2, -1):
         total = (total + abs(A[k])) * horizon.window
     return total * horizon.window * horizon.window
 

@@ -258,8 +258,8 @@ def apply_impact(block: Struct, state: Struct) -> float:
         speed = max(0.0, state.v)
         state.certificate_speed = np.inf
     state.u = 0.0
-    state.v = compute_restitution_factor(block, departed_side, speed, state.impacts) * speed
-    state.impacts += 1
+    state.v = compute_restitution_factor(block, departed_side, speed, state.impact_count) * speed
+    state.impact_count += 1
     return speed
 
 

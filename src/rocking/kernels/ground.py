@@ -34,10 +34,10 @@ class Ground(NamedTuple):
     pieces: Floats  # pieces of the motion, one per row
     stretches: Floats  # bounds on stretches of unscaled pieces, shape (stretches, components, 4)
     error: float  # approximation error of the unscaled motion
-    columns: int  # number of coefficients per component
-    first: int  # first column of this component
+    coefficient_count: int  # number of coefficients per component
+    first_column: int  # first column of this component
     factor: float  # factor on the motion
-    unit: float  # factor that converts coefficients and error to units of g
+    g_per_unit: float  # factor that converts coefficients and error to units of g
 
 
 class Grounds(NamedTuple):
@@ -48,8 +48,8 @@ class Grounds(NamedTuple):
     first_pieces: Integers  # first row of each motion in `pieces`, and their number
     first_stretches: Integers  # likewise in `stretches`
     errors: Floats  # approximation error of each unscaled motion
-    columns: int  # number of coefficients per component
-    unit: float  # factor that converts coefficients and errors to units of g
+    coefficient_count: int  # number of coefficients per component
+    g_per_unit: float  # factor that converts coefficients and errors to units of g
 
 
 class AccelerationBounds(NamedTuple):
@@ -74,8 +74,8 @@ def build_ground(
     stretches = np.zeros((-(-len(pieces) // PIECES_PER_STRETCH), len(components), 4))
     ground = Ground(pieces, stretches, error, columns, FIRST, 1.0, 1.0)
     for k, component in enumerate(components):
-        write_pieces(breakpoints, component, ground._replace(first=FIRST + k * columns), np.zeros(columns))
-    return ground._replace(unit=unit)
+        write_pieces(breakpoints, component, ground._replace(first_column=FIRST + k * columns), np.zeros(columns))
+    return ground._replace(g_per_unit=unit)
 
 
 def join_grounds(grounds: Sequence[Ground]) -> Grounds:
@@ -86,8 +86,8 @@ def join_grounds(grounds: Sequence[Ground]) -> Grounds:
         np.cumsum([0, *(len(ground.pieces) for ground in grounds)]),
         np.cumsum([0, *(len(ground.stretches) for ground in grounds)]),
         np.array([ground.error for ground in grounds]),
-        grounds[0].columns,
-        grounds[0].unit,
+        grounds[0].coefficient_count,
+        grounds[0].g_per_unit,
     )
 
 
@@ -96,14 +96,16 @@ def select_ground(grounds: Grounds, motion: int, factor: float) -> Ground:
     """Return one of the motions, multiplied by a factor."""
     pieces = grounds.pieces[grounds.first_pieces[motion] : grounds.first_pieces[motion + 1]]
     stretches = grounds.stretches[grounds.first_stretches[motion] : grounds.first_stretches[motion + 1]]
-    return Ground(pieces, stretches, grounds.errors[motion], grounds.columns, FIRST, factor, grounds.unit)
+    return Ground(
+        pieces, stretches, grounds.errors[motion], grounds.coefficient_count, FIRST, factor, grounds.g_per_unit
+    )
 
 
 def scale_coefficients(ground: Ground, pieces: Integers) -> list[Floats]:
     """Return the coefficients (g, g/s, ...) of a motion on some pieces: horizontal and, if present, vertical."""
-    columns, factors = ground.columns, (ground.factor, abs(ground.factor))
+    columns, factors = ground.coefficient_count, (ground.factor, abs(ground.factor))
     return [
-        ground.pieces[pieces, FIRST + k * columns :][:, :columns] * factors[k] * ground.unit
+        ground.pieces[pieces, FIRST + k * columns :][:, :columns] * factors[k] * ground.g_per_unit
         for k in range(ground.stretches.shape[1])
     ]
 
@@ -112,7 +114,7 @@ def compute_max_weights(grounds: Grounds, motions: Integers, factors: Floats) ->
     """Return the largest absolute weight in the ground's frame under each multiple, divided by the weight at rest."""
     if grounds.stretches.shape[1] == 1:
         return np.ones(len(factors))
-    scale, first = np.abs(factors) * grounds.unit, grounds.first_stretches[:-1]
+    scale, first = np.abs(factors) * grounds.g_per_unit, grounds.first_stretches[:-1]
     low = np.minimum.reduceat(grounds.stretches[:, 1, 0], first)
     high = np.maximum.reduceat(grounds.stretches[:, 1, 1], first)
     weights = [1.0 + scale * np.minimum(low, 0.0)[motions], 1.0 + scale * np.maximum(high, 0.0)[motions]]
@@ -127,7 +129,7 @@ def write_pieces(breakpoints: Floats, coefficients: Floats, ground: Ground, A: F
         pieces[k, START] = breakpoints[k]
         pieces[k, LENGTH] = breakpoints[k + 1] - breakpoints[k]
     for j in range(coefficients.shape[1]):
-        column = pieces[:, ground.first + j]
+        column = pieces[:, ground.first_column + j]
         for k in range(count):
             column[k] = coefficients[k, j]
     pieces[count, START] = breakpoints[count]
@@ -147,7 +149,7 @@ def write_pieces(breakpoints: Floats, coefficients: Floats, ground: Ground, A: F
 def bound_stretch(ground: Ground, stretch: int) -> AccelerationBounds:
     """Compute bounds on a stretch from those of the unscaled motion; those in scaled units include the rounding."""
     row = ground.stretches[stretch, component_index(ground)]
-    scale = ground.factor * ground.unit
+    scale = ground.factor * ground.g_per_unit
     first, second, size = scale * row[_MIN], scale * row[_MAX], abs(scale) * (1.0 + ROUNDING)
     rounding = ROUNDING * max(abs(first), abs(second))
     return AccelerationBounds(
@@ -158,7 +160,7 @@ def bound_stretch(ground: Ground, stretch: int) -> AccelerationBounds:
 @inlined
 def component_index(ground: Ground) -> int:
     """Return the index of the component in bounds on stretches: 0 horizontal, 1 vertical."""
-    return 0 if ground.first == FIRST else 1
+    return 0 if ground.first_column == FIRST else 1
 
 
 @inlined
@@ -170,22 +172,23 @@ def has_vertical(ground: Ground) -> bool:
 @inlined
 def select_vertical(ground: Ground) -> Ground:
     """Return the vertical component of the motion."""
+    first_column = ground.first_column + ground.coefficient_count
     return Ground(
-        ground.pieces, ground.stretches, ground.error, ground.columns, ground.first + ground.columns,
-        abs(ground.factor), ground.unit,
+        ground.pieces, ground.stretches, ground.error, ground.coefficient_count, first_column, abs(ground.factor),
+        ground.g_per_unit,
     )  # fmt: skip
 
 
 @inlined
 def ground_error(ground: Ground) -> float:
     """Return the approximation error of the scaled motion, g."""
-    return (ground.error * abs(ground.factor)) * ground.unit
+    return (ground.error * abs(ground.factor)) * ground.g_per_unit
 
 
 @inlined
 def is_piecewise_linear(ground: Ground) -> bool:
-    """Return whether the motion is linear in time on each piece, as structs are."""
-    return ground.columns == 2
+    """Return whether the motion is linear in time on each piece, as in records."""
+    return ground.coefficient_count == 2
 
 
 @inlined
@@ -209,14 +212,14 @@ def piece_length(ground: Ground, piece: int) -> float:
 @inlined
 def coefficient(ground: Ground, piece: int, power: int) -> float:
     """Return the coefficient of a power of the time within a piece, g/s^power."""
-    return (ground.pieces[piece, ground.first + power] * ground.factor) * ground.unit
+    return (ground.pieces[piece, ground.first_column + power] * ground.factor) * ground.g_per_unit
 
 
 @inlined
 def compute_acceleration(ground: Ground, piece: int, offset: float) -> float:
     """Compute the ground acceleration within a piece, g."""
     value = 0.0
-    for k in range(ground.columns - 1, -1, -1):
+    for k in range(ground.coefficient_count - 1, -1, -1):
         value = value * offset + coefficient(ground, piece, k)
     return value
 
@@ -225,7 +228,7 @@ def compute_acceleration(ground: Ground, piece: int, offset: float) -> float:
 def compute_acceleration_rate(ground: Ground, piece: int, offset: float) -> float:
     """Compute the rate of the ground acceleration within a piece, g/s."""
     value = 0.0
-    for k in range(ground.columns - 1, 0, -1):
+    for k in range(ground.coefficient_count - 1, 0, -1):
         value = value * offset + k * coefficient(ground, piece, k)
     return value
 
@@ -233,7 +236,7 @@ def compute_acceleration_rate(ground: Ground, piece: int, offset: float) -> floa
 @inlined
 def write_local_series(ground: Ground, piece: int, offset: float, sign: float, A: Floats) -> int:
     """Write a piece's polynomial about ``offset``, times ``sign``, into A and return its degree."""
-    degree = ground.columns - 1
+    degree = ground.coefficient_count - 1
     while degree > 0 and coefficient(ground, piece, degree) == 0.0:
         A[degree] = 0.0
         degree -= 1
@@ -268,7 +271,7 @@ def bound_piece(ground: Ground, piece: int, offset: float, duration: float, A: F
 
     For degree 1 they are exact except for rounding. ``A`` is scratch space.
     """
-    columns = ground.columns
+    columns = ground.coefficient_count
     if columns == 2:
         start, rate = coefficient(ground, piece, 0), coefficient(ground, piece, 1)
         first = start + rate * offset
@@ -293,7 +296,7 @@ def bound_piece(ground: Ground, piece: int, offset: float, duration: float, A: F
 def sum_absolute_terms(ground: Ground, piece: int, t: float) -> tuple[float, float]:
     """Compute the sums of the |terms| of a piece and of its slope at t, to which the rounding is proportional."""
     size = slope_size = 0.0
-    for k in range(ground.columns - 1, -1, -1):
+    for k in range(ground.coefficient_count - 1, -1, -1):
         slope_size = slope_size * t + size
         size = size * t + abs(coefficient(ground, piece, k))
     return size, slope_size

@@ -58,17 +58,17 @@ _MAX_NEXT_RATIO = 2.0**-46
 
 
 @inlined
-def compute_push_line(group: Struct, lane: int, unit: float) -> ValueAndSlope:
+def compute_push_line(group: Struct, lane: int, g_per_unit: float) -> ValueAndSlope:
     """Return the ground acceleration at the start of a sample and its slope, g, rounded as `ground.coefficient`."""
     factor = group.factor[lane]
-    return (group.push_start[lane] * factor) * unit, (group.push_slope[lane] * factor) * unit
+    return (group.push_start[lane] * factor) * g_per_unit, (group.push_slope[lane] * factor) * g_per_unit
 
 
 @inlined
-def compute_weight_line(group: Struct, lane: int, unit: float) -> ValueAndSlope:
+def compute_weight_line(group: Struct, lane: int, g_per_unit: float) -> ValueAndSlope:
     """Return the weight at the start of a sample, divided by the weight at rest, and its slope."""
     factor = abs(group.factor[lane])
-    return 1.0 + (group.vertical_start[lane] * factor) * unit, (group.vertical_slope[lane] * factor) * unit
+    return 1.0 + (group.vertical_start[lane] * factor) * g_per_unit, (group.vertical_slope[lane] * factor) * g_per_unit
 
 
 @inlined
@@ -93,7 +93,7 @@ def is_event_free(
 
 
 @not_inlined
-def step_linear(group: Struct, unit: float) -> int:
+def step_linear(group: Struct, g_per_unit: float) -> int:
     """Step a group through one sample by Stumpff's functions (exact for any lam and h); return the number of events.
 
     Because w = u'' then satisfies w'' = lam w, its extrema are at the ends of the step (except for
@@ -102,7 +102,7 @@ def step_linear(group: Struct, unit: float) -> int:
     events = 0
     for lane in range(LANE_COUNT):
         h = group.h[lane]
-        start, slope = compute_push_line(group, lane, unit)
+        start, slope = compute_push_line(group, lane, g_per_unit)
         end = start + slope * h
         u, v = group.u[lane], group.v[lane]
         lam, push_gain = group.stiffness[lane], group.push_gain[lane]
@@ -169,17 +169,17 @@ def accept_states(group: Struct, substeps: int, scaled: bool) -> tuple[int, int]
 
 
 @not_inlined
-def step_weighted(group: Struct, unit: float, substeps: int) -> int:
+def step_weighted(group: Struct, g_per_unit: float, substeps: int) -> int:
     """Step a group of the linear model through one sample under varying weight; return the number of events."""
     begin_step(group)
     copy_states(group, substeps, scaled=False)
     for k in range(substeps):
-        take_weighted_substep(group, unit, k, substeps)
+        take_weighted_substep(group, g_per_unit, k, substeps)
     return accept_states(group, substeps, scaled=False)[0]
 
 
 @not_inlined
-def take_weighted_substep(group: Struct, unit: float, k: int, substeps: int) -> None:
+def take_weighted_substep(group: Struct, g_per_unit: float, k: int, substeps: int) -> None:
     """Move the copies through the k-th substep and mark the lanes in which an event may occur.
 
     With z = h^2 (lam u - pull), r' = weight z - h^2 push. A term contributes to the second next and, as the weight
@@ -188,8 +188,8 @@ def take_weighted_substep(group: Struct, unit: float, k: int, substeps: int) -> 
     for lane in range(LANE_COUNT):
         h = group.length[lane] / substeps
         square, rate = h * h, 1.0 / h
-        side_push = shift_line(compute_push_line(group, lane, unit), k, h)
-        weight = shift_line(compute_weight_line(group, lane, unit), k, h)
+        side_push = shift_line(compute_push_line(group, lane, g_per_unit), k, h)
+        weight = shift_line(compute_weight_line(group, lane, g_per_unit), k, h)
         w, d = weight
         u, v = group.next_u[lane], group.next_v[lane]
         q, gain = group.stiffness[lane] * square, group.push_gain[lane] * square
@@ -222,16 +222,16 @@ def shift_line(line: ValueAndSlope, k: int, h: float) -> ValueAndSlope:
 
 @inlined
 def shift_weight(
-    group: Struct, lane: int, resting_weight: ValueAndSlope | None, unit: float, k: int, h: float
+    group: Struct, lane: int, resting_weight: ValueAndSlope | None, g_per_unit: float, k: int, h: float
 ) -> ValueAndSlope | None:
     """Return the weight at the start of the k-th substep of length h, and its change; None if it is constant."""
     if resting_weight is None:
         return resting_weight
-    return shift_line(compute_weight_line(group, lane, unit), k, h)
+    return shift_line(compute_weight_line(group, lane, g_per_unit), k, h)
 
 
 @not_inlined
-def step_nonlinear(group: Struct, resting_weight: ValueAndSlope | None, unit: float, substeps: int) -> int:
+def step_nonlinear(group: Struct, resting_weight: ValueAndSlope | None, g_per_unit: float, substeps: int) -> int:
     """Step a group of the nonlinear model through one sample and return the number of events.
 
     ``resting_weight`` is (1, 0), the weight without vertical motion and its slope, or None if it is constant. A lane
@@ -242,7 +242,7 @@ def step_nonlinear(group: Struct, resting_weight: ValueAndSlope | None, unit: fl
         count = refinement * substeps
         copy_states(group, count, scaled=True)
         for k in range(count):
-            take_nonlinear_substep(group, resting_weight, unit, k, count, 1.0 / refinement)
+            take_nonlinear_substep(group, resting_weight, g_per_unit, k, count, 1.0 / refinement)
         events, retries = accept_states(group, count, scaled=True)
         if retries == 0:
             break
@@ -251,7 +251,7 @@ def step_nonlinear(group: Struct, resting_weight: ValueAndSlope | None, unit: fl
 
 @not_inlined
 def take_nonlinear_substep(
-    group: Struct, resting_weight: ValueAndSlope | None, unit: float, k: int, count: int, fraction: float
+    group: Struct, resting_weight: ValueAndSlope | None, g_per_unit: float, k: int, count: int, fraction: float
 ) -> None:
     """Move the copies through the k-th of ``count`` substeps, and mark lanes with possible events or truncation.
 
@@ -263,8 +263,8 @@ def take_nonlinear_substep(
         scale = (group.length[lane] / group.h[lane] * fraction) ** 2
         u, r1 = group.next_u[lane], group.next_v[lane]
         s0, c0 = group.next_sine[lane], group.next_cosine[lane]
-        weight = shift_weight(group, lane, resting_weight, unit, k, span)
-        lane_push = shift_line(compute_push_line(group, lane, unit), k, span)
+        weight = shift_weight(group, lane, resting_weight, g_per_unit, k, span)
+        lane_push = shift_line(compute_push_line(group, lane, g_per_unit), k, span)
         side_push = (group.push_gain[lane] * lane_push[0], group.push_gain[lane] * lane_push[1])
         l2 = group.stiffness[lane] * scale
         terms, angle_sums = compute_nonlinear_terms(r1, (s0, c0), l2, side_push, weight)

@@ -1,4 +1,4 @@
-"""Simulation of many blocks under evenly sampled structs: together, or one by one where an event may occur.
+"""Simulation of many blocks under evenly sampled records: together, or one by one where an event may occur.
 
 A lane contains one simulation: a block, a motion, and the factor on it. Each lane is at its own sample of its own
 motion, and starts another simulation when one ends. All lanes step through their samples together, in loops that
@@ -192,7 +192,7 @@ def clear_lane(pool: SimulationPool, lane: int) -> None:
 
 @kernel
 def run_lanes(settings: Struct, scratch: Struct, pool: SimulationPool, substeps: int) -> None:
-    """Run all simulations of a pool under evenly sampled structs to their ends.
+    """Run all simulations of a pool under evenly sampled records to their ends.
 
     ``substeps`` per sample is 0 in the linear model under constant weight. Afterwards ``status`` of every state is an
     `MarchStatus`; PAUSED states can be continued individually.
@@ -203,7 +203,7 @@ def run_lanes(settings: Struct, scratch: Struct, pool: SimulationPool, substeps:
     while pool.counts.active > 0:
         load_samples(pool)
         if pool.blocks[0].has_friction:
-            mark_slips(group, pool.grounds.unit, substeps)
+            mark_slips(group, pool.grounds.g_per_unit, substeps)
         events = step_group(settings, pool, substeps)
         lane = 0
         while events > 0:
@@ -239,7 +239,7 @@ def load_samples(pool: SimulationPool) -> None:
 
 
 @inlined
-def mark_slips(group: Struct, unit: float, substeps: int) -> None:
+def mark_slips(group: Struct, g_per_unit: float, substeps: int) -> None:
     """Cause an event in each lane whose block may slip during a sample: without overturning angle until its march.
 
     See `sliding.may_slip`. The weight is constant; without substeps the model is linear. Rotations beyond twice the
@@ -247,11 +247,11 @@ def mark_slips(group: Struct, unit: float, substeps: int) -> None:
     """
     if substeps == 0:
         for lane in range(LANE_COUNT):
-            sticks = find_largest_push(group, lane, unit) <= group.sticking_push[lane]
+            sticks = find_largest_push(group, lane, g_per_unit) <= group.sticking_push[lane]
             group.overturn_angle[lane] = group.overturn_angle[lane] if sticks else -np.inf
         return
     for lane in range(LANE_COUNT):
-        largest = find_largest_push(group, lane, unit)
+        largest = find_largest_push(group, lane, g_per_unit)
         max_change = -2.0 * group.stiffness[lane] * (substeps * substeps) / group.length[lane]
         speed = abs(group.v[lane]) + max_change * (1.0 + largest)
         sticks = largest <= group.sticking_push[lane] - group.sticking_slope[lane] * (speed * speed)
@@ -259,9 +259,9 @@ def mark_slips(group: Struct, unit: float, substeps: int) -> None:
 
 
 @inlined
-def find_largest_push(group: Struct, lane: int, unit: float) -> float:
+def find_largest_push(group: Struct, lane: int, g_per_unit: float) -> float:
     """Return the largest absolute ground acceleration during a sample, g."""
-    start, slope = compute_push_line(group, lane, unit)
+    start, slope = compute_push_line(group, lane, g_per_unit)
     return max(abs(start), abs(start + slope * group.length[lane]))
 
 
@@ -274,12 +274,12 @@ def has_vertical_motion(pool: SimulationPool) -> bool:
 @inlined
 def step_group(settings: Struct, pool: SimulationPool, substeps: int) -> int:
     """Step all lanes through their samples and return the number of those with possible events."""
-    group, unit = pool.groups[0], pool.grounds.unit
+    group, g_per_unit = pool.groups[0], pool.grounds.g_per_unit
     if settings.nonlinear:
         if has_vertical_motion(pool):
-            return step_nonlinear(group, (1.0, 0.0), unit, substeps)
-        return step_nonlinear(group, None, unit, substeps)
-    return step_weighted(group, unit, substeps) if has_vertical_motion(pool) else step_linear(group, unit)
+            return step_nonlinear(group, (1.0, 0.0), g_per_unit, substeps)
+        return step_nonlinear(group, None, g_per_unit, substeps)
+    return step_weighted(group, g_per_unit, substeps) if has_vertical_motion(pool) else step_linear(group, g_per_unit)
 
 
 @inlined

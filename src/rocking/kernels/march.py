@@ -164,16 +164,16 @@ def rest_until_uplift(
     state.last_uplift_time = state.last_impact_time = compute_state_time(ground, state)
     state.certificate_speed = np.inf
     state.time_at_rest += state.last_uplift_time - state.last_rest_time
-    if state.uplifts == 0:
+    if state.uplift_count == 0:
         state.first_uplift = state.last_uplift_time
-    state.uplifts += 1
+    state.uplift_count += 1
     if has_vertical(ground) and is_pushed_off_both_sides(ground, block, state, state.offset):
         h = piece_length(ground, state.piece) - state.offset
         A, d = scratch.ground, scratch.auxiliary
         if block.next_side[0] != 0 and is_side_uncertain(ground, block, state.piece, state.offset, h, A, d):
             state.rounding_decisions += 1
         elif (
-            state.rests > 0
+            state.rest_count > 0
             and state.last_uplift_time - state.last_rest_time <= _AMBIGUOUS_DISTANCE * state.last_uplift_time
         ):
             state.rounding_decisions += 1  # the last of its impacts may have been too late
@@ -324,9 +324,9 @@ def write_slip_event(ground: Ground, settings: Struct, table: Structs, state: St
 def count_rest(settings: Struct, table: Structs, state: Struct, time: float) -> None:
     """Count and write a rest."""
     state.last_rest_time = time
-    if state.rests == 0:
+    if state.rest_count == 0:
         state.first_rest = time
-    state.rests += 1
+    state.rest_count += 1
     write_event(settings, table, state, time, EventKind.REST)
 
 

@@ -203,7 +203,7 @@ def build_step_rows(ground: Ground, block: Struct) -> Floats:
         series[0, :, 0] = series[1, :, 1] = 1.0
         for k in range(_TERMS):
             series[:, :, k + 2] = lam * series[:, :, k] - drag * (k + 1) * series[:, :, k + 1]
-            if k < ground.columns:
+            if k < ground.coefficient_count:
                 series[2, :, k + 2] += force[:, k]
             series[:, :, k + 2] /= (k + 1) * (k + 2)
         powers = length[:, None] ** np.arange(_TERMS + 2)
@@ -211,7 +211,9 @@ def build_step_rows(ground: Ground, block: Struct) -> Floats:
         rates = np.sum((series[..., 1:] * np.arange(1, _TERMS + 2) * powers[:, :-1])[..., ::-1], axis=-1)
         rows[side, :, :_OFFSET] = np.stack([values[0], values[1], rates[0], rates[1]], axis=-1)
         rows[side, :, _OFFSET], rows[side, :, _OFFSET + 1] = values[2], rates[2]
-        rows[side, :, _FORCE] = np.sum(np.abs(force) * powers[:, : ground.columns], axis=-1) * (1.0 + ROUNDING)
+        rows[side, :, _FORCE] = np.sum(np.abs(force) * powers[:, : ground.coefficient_count], axis=-1) * (
+            1.0 + ROUNDING
+        )
         rows[side, :, _ROOT], rows[side, :, _RATE], rows[side, :, _LENGTH] = root, root + drag, length
     return rows
 
@@ -289,21 +291,21 @@ def differentiate_period(
     state.stop_piece = count_pieces(ground)
     state.budget = compute_iteration_budget(state)
     status = MarchStatus.FULL.value
-    impacts, area = 0, 0.0
+    impacts, log_determinant = 0, 0.0
     while status == MarchStatus.FULL:
-        state.nodes = state.impacts = state.events = state.sequences = 0
+        state.node_count = state.impact_count = state.event_count = state.sequence_count = 0
         status = march(ground, block, settings, table, scratch, state)
-        impacts += state.impacts
-        for n in range(state.nodes - 1):
-            area += apply_step(trail, scratch, variation, table[n].node, table[n + 1].node, M)
-        if state.nodes > 0:
-            area += apply_step(trail, scratch, variation, table[state.nodes - 1].node, state, M)
+        impacts += state.impact_count
+        for n in range(state.node_count - 1):
+            log_determinant += apply_step(trail, scratch, variation, table[n].node, table[n + 1].node, M)
+        if state.node_count > 0:
+            log_determinant += apply_step(trail, scratch, variation, table[state.node_count - 1].node, state, M)
     state.status = shift_back(ground, block, state, status)
     if state.status == PeriodOutcome.RESTS or state.status == PeriodOutcome.RESTS_FOR_EVER:
         M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = 0.0
     elif state.status != PeriodOutcome.MOVES:
         M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = np.nan
-    return impacts, area
+    return impacts, log_determinant
 
 
 @kernel
@@ -321,7 +323,7 @@ def measure_stretches(
     M = frame[:2]
     impacts = 0
     for n in range(logs.shape[0]):
-        new_impacts, area = differentiate_period(trail, scratch, variation, table, state, M)
+        new_impacts, log_determinant = differentiate_period(trail, scratch, variation, table, state, M)
         impacts += new_impacts
         if state.status != PeriodOutcome.MOVES and state.status != PeriodOutcome.RESTS:
             break
@@ -330,7 +332,7 @@ def measure_stretches(
         length = math.sqrt(x * x + y * y)
         if length > 0.0:
             logs[n, 0] = math.log(length)
-            logs[n, 1] = area - logs[n, 0]
+            logs[n, 1] = log_determinant - logs[n, 0]
             frame[2, 0], frame[2, 1] = x / length, y / length
         else:
             logs[n, 0] = logs[n, 1] = -np.inf
@@ -357,14 +359,14 @@ def apply_step(trail: Trail, scratch: Struct, variation: Struct, node: Struct, n
     order, _, degree = expand_arc(ground, block, settings, scratch, node, h)
     expand_unforced(trail, scratch, variation, node.side, degree, order)
     for column in range(2):
-        variation.change[0], variation.change[1] = M[0, column], M[1, column]
+        variation.rotation[0], variation.rotation[1] = M[0, column], M[1, column]
         write_variation_coefficients(variation, block.damping[node.side], order)
-        M[0, column], M[1, column], _ = evaluate_series(variation.change, order, h)
-    area = -block.damping[node.side] * h
+        M[0, column], M[1, column], _ = evaluate_series(variation.rotation, order, h)
+    log_determinant = -block.damping[node.side] * h
     if next_node.u == 0.0 and h > 0.0:
         _, v, _ = evaluate_series(scratch.rotation, order, h)
-        area += apply_saltation(ground, block, node.side, next_node, v, M)
-    return area
+        log_determinant += apply_saltation(ground, block, node.side, next_node, v, M)
+    return log_determinant
 
 
 @inlined

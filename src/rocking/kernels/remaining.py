@@ -68,18 +68,18 @@ def estimate_remaining_time(v: float, i: ImpactSide, j: ImpactSide) -> float:
     stiffness on every arc, complete under constant acceleration.
     """
     e_i, e_j = i.restitution, j.restitution
-    pair = e_i * e_j
+    product = e_i * e_j
     inverse_i, inverse_j = 1.0 / i.g, 1.0 / j.g
     slope_i, slope_j = i.rate * inverse_i * inverse_i, j.rate * inverse_j * inverse_j
-    scale = 2.0 / (1.0 - pair)
+    scale = 2.0 / (1.0 - product)
     A_i, A_j = scale * (inverse_i + e_i * inverse_j), scale * (inverse_j + e_j * inverse_i)
     drift_i, drift_j = -scale * (slope_i + e_i * slope_j), -scale * (slope_j + e_j * slope_i)
     source_i = slope_i * (2.0 * e_i * A_j - 4.0 * inverse_i) * THIRD + 2.0 * e_i * inverse_i * drift_j
     source_j = slope_j * (2.0 * e_j * A_i - 4.0 * inverse_j) * THIRD + 2.0 * e_j * inverse_j * drift_i
-    B_i = (source_i + e_i * e_i * source_j) / (1.0 - pair * pair)
+    B_i = (source_i + e_i * e_i * source_j) / (1.0 - product * product)
     stiff_i = i.stiffness * (inverse_i * inverse_i * inverse_i)
     stiff_j = j.stiffness * (inverse_j * inverse_j * inverse_j)
-    C_i = 2.0 * THIRD * (stiff_i + e_i * e_i * e_i * stiff_j) / (1.0 - pair * pair * pair)
+    C_i = 2.0 * THIRD * (stiff_i + e_i * e_i * e_i * stiff_j) / (1.0 - product * product * product)
     return v * (A_i + v * (B_i + v * C_i))
 
 

@@ -199,7 +199,7 @@ def apply_proven_impacts(
         state.v = next_speed
         state.offset += t
         state.last_impact_time = piece_start(ground, state.piece) + state.offset
-        state.impacts += 1
+        state.impact_count += 1
         state.proven_impacts += 1
         state.budget -= 1
         write_impact(settings, table, state, state.last_impact_time, speed)

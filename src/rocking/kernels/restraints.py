@@ -262,8 +262,8 @@ def compute_static_restoring(block: Struct, tendon_state: tuple[bool, int, float
         pull += block.tendon_stiffness[side] * min(stretch, block.yield_elongation - block.slack_elongation)
     if nonlinear:
         psi, pull = block.slenderness[side] - u, pull * math.cos(0.5 * u)
-        gravity = block.stiffness[side] * ((1.0 + weight) * math.sin(psi) + push * math.cos(psi))
+        restoring = block.stiffness[side] * ((1.0 + weight) * math.sin(psi) + push * math.cos(psi))
     else:
         standing = block.restoring_gain[side] * (block.threshold[side] * (1.0 + weight) + push)
-        gravity = standing - block.stiffness[side] * (1.0 + weight) * u
-    return gravity + pull + block.spring[side] * u
+        restoring = standing - block.stiffness[side] * (1.0 + weight) * u
+    return restoring + pull + block.spring[side] * u

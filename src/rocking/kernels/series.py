@@ -160,11 +160,11 @@ def compute_next_coefficient(
 
 @inlined
 def write_variation_coefficients(variation: Struct, damping: float, order: int) -> None:
-    """Write the coefficients 2 to ``order`` of x'' = stiffness x - damping x' + forcing into variation.change.
+    """Write the coefficients 2 to ``order`` of x'' = stiffness x - damping x' + forcing into variation.rotation.
 
     The first two must be set beforehand.
     """
-    stiffness, forcing, x = variation.stiffness, variation.forcing, variation.change
+    stiffness, forcing, x = variation.stiffness, variation.forcing, variation.rotation
     for k in range(order - 1):
         value = forcing[k]
         for j in range(k + 1):

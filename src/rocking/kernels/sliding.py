@@ -89,7 +89,7 @@ def may_slip(ground: Ground, block: Struct, settings: Struct, scratch: Struct, s
             allowed -= block.sticking_slope[side] * (speed * speed)
         if push <= allowed and max(state.peak, end.peak) <= 2.0 * block.slenderness[side]:
             return False
-    ratio, arm = block.arm[side] * block.stiffness[side], block.arm[side]
+    ratio, arm = block.arm_over_g[side] * block.stiffness[side], block.arm_over_g[side]
     motion = bound_piece(ground, state.piece, state.offset, h, scratch.ground)
     push_low, push_high = (motion.low, motion.high) if side == 0 else (-motion.high, -motion.low)
     push = max(abs(push_low), abs(push_high))
@@ -135,7 +135,7 @@ def find_slip(
     for towards in (1, -1):
         d = scratch.auxiliary
         for k in range(order - 1):
-            d[k] = block.static_friction * scratch.normal[k] - towards * scratch.slip[k]
+            d[k] = block.static_friction * scratch.normal[k] - towards * scratch.horizontal[k]
         passage = find_first_negative_beyond_rounding(d, order - 2, min(h, time))
         if passage < time:
             time, direction = passage, -towards * sign
@@ -146,8 +146,8 @@ def find_slip(
 def write_contact_series(
     ground: Ground, block: Struct, settings: Struct, scratch: Struct, state: Struct, degree: int, order: int
 ) -> None:
-    """Write the series of the horizontal and the normal force without slip into scratch.slip and scratch.normal."""
-    c, q, arm = scratch.rotation, scratch.squares, block.arm[state.side]
+    """Write the horizontal and the normal force without slip into scratch.horizontal and scratch.normal."""
+    c, q, arm = scratch.rotation, scratch.squares, block.arm_over_g[state.side]
     weight_degree = degree if has_vertical(ground) else 0
     for n in range(order - 1):
         horizontal = scratch.ground[n] if n <= degree else 0.0
@@ -160,7 +160,7 @@ def write_contact_series(
                 y = c[n - m + 2] / INTEGRATED_TWICE[n - m]
                 horizontal += arm * (scratch.cosine[m] * y + scratch.sine[m] * q[n - m])
                 normal += arm * (scratch.sine[m] * y - scratch.cosine[m] * q[n - m])
-        scratch.slip[n] = horizontal
+        scratch.horizontal[n] = horizontal
         scratch.normal[n] = normal
 
 
@@ -183,8 +183,8 @@ def expand_slip(
 ) -> tuple[int, float]:
     """Write the series of slide-rock from a state into scratch; return (order, step), the step at most ``h_max``.
 
-    They are the rotation, the slip velocity in the frame of the side (scratch.slip), and the clearance W - R cos(psi)
-    u'^2, which is positive in contact (scratch.undivided_normal). A series ends where its last terms are negligible.
+    They are the rotation, the slip velocity in the frame of the side (scratch.horizontal), and the clearance
+    W - R cos(psi) u'^2, which is positive in contact (scratch.undivided_normal). The last terms are negligible.
     """
     side = state.side
     sign = side_sign(side)
@@ -197,7 +197,7 @@ def expand_slip(
     degree = write_local_series(ground, state.piece, state.offset, sign, scratch.ground)
     weight_degree = write_weight_series(ground, state.piece, state.offset, scratch.weight)
     degree = pad_to_same_degree(scratch.ground, degree, scratch.weight, weight_degree)
-    c, V = scratch.rotation, scratch.slip
+    c, V = scratch.rotation, scratch.horizontal
     c[0], c[1], V[0] = state.u, state.v, sign * state.slip_rate
     if settings.nonlinear:
         psi = block.slenderness[side] - state.u
@@ -225,9 +225,9 @@ def write_slip_coefficients(
     block: Struct, settings: Struct, side: int, scratch: Struct, direction: float, n: int, push: float, weight: float
 ) -> None:
     """Write c[n + 2] and V[n + 1] of slide-rock from the earlier coefficients."""
-    c, V, q = scratch.rotation, scratch.slip, scratch.squares
+    c, V, q = scratch.rotation, scratch.horizontal, scratch.squares
     s, k, b, D, N = scratch.sine, scratch.cosine, scratch.lever, scratch.divisor, scratch.normal
-    mu, arm = direction * block.kinetic_friction, block.arm[side]
+    mu, arm = direction * block.kinetic_friction, block.arm_over_g[side]
     if not settings.nonlinear:
         scratch.undivided_normal[n] = N[n] = weight
         y = weight * (mu - block.slenderness[side])
@@ -260,7 +260,7 @@ def write_slip_coefficients(
 @inlined
 def shorten_slip(block: Struct, scratch: Struct, h: float) -> float:
     """Return a step, at most h, within which the last terms of both series are negligible."""
-    c, V = scratch.rotation, scratch.slip
+    c, V = scratch.rotation, scratch.horizontal
     for _ in range(_MAX_SHORTENINGS):
         largest, largest_slip, power = 0.0, abs(V[0]) + block.kinetic_friction * h, h
         excess = 0.0
@@ -291,7 +291,7 @@ def find_slip_end(scratch: Struct, order: int, h: float, direction: float) -> tu
     """Find the first times in [0, h) at which slide-rock sticks, and at which contact is lost; inf if never."""
     d = scratch.auxiliary
     for k in range(order):
-        d[k] = direction * scratch.slip[k]
+        d[k] = direction * scratch.horizontal[k]
     ignore_rounding_at_start(d)
     stick = find_first_negative_beyond_rounding(d, order - 1, h)
     for k in range(order - 1):
@@ -301,7 +301,7 @@ def find_slip_end(scratch: Struct, order: int, h: float, direction: float) -> tu
 
 @inlined
 def move_slip(scratch: Struct, state: Struct, degree: int, sign: float, t: float) -> None:
-    """Move the displacement and the velocity of the foot along the series in scratch.slip, in a frame of some sign."""
+    """Move displacement and velocity of the foot along the series in scratch.horizontal, in a frame of some sign."""
     distance, velocity = integrate_slip(scratch, degree, t)
     state.slip += sign * distance
     state.slip_rate = sign * velocity
@@ -310,8 +310,8 @@ def move_slip(scratch: Struct, state: Struct, degree: int, sign: float, t: float
 
 @inlined
 def integrate_slip(scratch: Struct, degree: int, t: float) -> tuple[float, float]:
-    """Return the distance until t, and the velocity at t, of the series in scratch.slip."""
-    V = scratch.slip
+    """Return the distance until t, and the velocity at t, of the series in scratch.horizontal."""
+    V = scratch.horizontal
     distance, velocity = V[degree] / (degree + 1), V[degree]
     for k in range(degree - 1, -1, -1):
         distance = distance * t + V[k] / (k + 1)
@@ -321,8 +321,8 @@ def integrate_slip(scratch: Struct, degree: int, t: float) -> tuple[float, float
 
 @not_inlined
 def expand_slide(ground: Ground, block: Struct, scratch: Struct, state: Struct) -> int:
-    """Write the series of the velocity of a block that slides on both pivots into scratch.slip; return its degree."""
-    A, W, V = scratch.ground, scratch.weight, scratch.slip
+    """Write the velocity of a block that slides on both pivots into scratch.horizontal; return its degree."""
+    A, W, V = scratch.ground, scratch.weight, scratch.horizontal
     degree = write_local_series(ground, state.piece, state.offset, 1.0, A)
     degree = pad_to_same_degree(A, degree, W, write_weight_series(ground, state.piece, state.offset, W))
     V[0] = state.slip_rate
@@ -340,7 +340,7 @@ def find_slide_end(
     if state.piece == last_piece(ground):
         h = min(h, 2.0 * abs(state.slip_rate) / block.kinetic_friction)
     for k in range(degree + 1):
-        d[k] = state.direction * scratch.slip[k]
+        d[k] = state.direction * scratch.horizontal[k]
     ignore_rounding_at_start(d)
     stick = find_first_negative_beyond_rounding(d, degree, h)
     lost = np.inf
@@ -358,8 +358,8 @@ def find_slide_end(
 def compute_slip_factor(block: Struct, side: int, e: float, direction: float) -> float:
     """Compute the factor on the speed of an impact that leaves a side and slips; ``direction`` is the slip's sign."""
     other = 1 - side
-    h, d, next_d = block.height, block.pivot_distance[side], block.pivot_distance[other]
-    inertia = block.arm[other] / block.stiffness[other]
+    h, d, next_d = block.height_over_g, block.pivot_distance_over_g[side], block.pivot_distance_over_g[other]
+    inertia = block.arm_over_g[other] / block.stiffness[other]
     square = inertia - h * h - next_d * next_d
     couple = e * inertia - (square + h * h - d * next_d)
     lever = next_d - side_sign(other) * direction * block.kinetic_friction * h
@@ -370,8 +370,13 @@ def compute_slip_factor(block: Struct, side: int, e: float, direction: float) ->
 def strike_with_friction(block: Struct, state: Struct, side: int, speed: float) -> None:
     """Change speed, slip and mode at an impact that has left a side and would stick with the speed of the state."""
     other = 1 - side
-    j, h, d, next_d = side_sign(other), block.height, block.pivot_distance[side], block.pivot_distance[other]
-    inertia = block.arm[other] / block.stiffness[other]
+    j, h, d, next_d = (
+        side_sign(other),
+        block.height_over_g,
+        block.pivot_distance_over_g[side],
+        block.pivot_distance_over_g[other],
+    )
+    inertia = block.arm_over_g[other] / block.stiffness[other]
     e = state.v / speed if speed > 0.0 else 0.0
     V = state.slip_rate
     after, rate = state.v + j * h * V / inertia, 0.0
@@ -395,7 +400,11 @@ def strike_with_friction(block: Struct, state: Struct, side: int, speed: float) 
 def find_sticking_friction(block: Struct, side: int) -> float:
     """Compute the friction with which an impact that leaves a side sticks if nothing slips before (Eq. 7)."""
     e = block.restitution[side]
-    return block.height * (1.0 - e) / (block.pivot_distance[1 - side] * e + block.pivot_distance[side])
+    return (
+        block.height_over_g
+        * (1.0 - e)
+        / (block.pivot_distance_over_g[1 - side] * e + block.pivot_distance_over_g[side])
+    )
 
 
 @inlined
@@ -410,8 +419,8 @@ def sum_slip_of_sequence(
     """
     side, w, sign = state.side, state.v, side_sign(state.side)
     mu = state.direction * block.kinetic_friction
-    d, next_d = block.pivot_distance[side], block.pivot_distance[1 - side]
-    drift = sign * block.height * w
+    d, next_d = block.pivot_distance_over_g[side], block.pivot_distance_over_g[1 - side]
+    drift = sign * block.height_over_g * w
     if settings.nonlinear:
         return drift + mu * d * w, 0.0
     e = compute_slip_factor(block, side, block.restitution[side], state.direction)

@@ -161,10 +161,10 @@ BLOCK_DTYPE = define_struct(
     has_friction="?",  # whether the body may slip
     static_friction="f8",  # coefficient of friction without slip
     kinetic_friction="f8",  # coefficient of friction while slipping
-    arm=_SIDES,  # distance of the centre of mass from the pivot divided by g, s^2; in the linear model its height
+    arm_over_g=_SIDES,  # distance of the centre of mass from the pivot, linear model: its height, divided by g, s^2
     inertia_ratio=_SIDES,  # square of that distance divided by the square of the radius of gyration
-    pivot_distance=_SIDES,  # horizontal distance of the centre of mass from the pivot divided by g, s^2
-    height="f8",  # height of the centre of mass divided by g, s^2
+    pivot_distance_over_g=_SIDES,  # horizontal distance of the centre of mass from the pivot divided by g, s^2
+    height_over_g="f8",  # height of the centre of mass divided by g, s^2
     sticking_push=_SIDES,  # push below which a body sticks up to twice its slenderness, without speed
     sticking_slope=_SIDES,  # decrease of that push per square of the speed, s^2
 )
@@ -192,7 +192,7 @@ STATE_DTYPE = define_struct(
     proven_impacts="i8",  # impacts since chattering was proven
     certificate_speed="f8",  # speed below which another proof is attempted
     last_impact_time="f8",  # time of the last impact or uplift, s
-    impacts="i8",  # number of impacts so far
+    impact_count="i8",  # number of impacts so far
     status="i8",  # a `MarchStatus`
     continuous_uplift="?",  # whether the body has just been lifted without a jump
     peak_time="f8",  # time of the largest rotation, s
@@ -203,11 +203,11 @@ STATE_DTYPE = define_struct(
     first_rest="f8",  # time of the first rest, s; 0 without one
     time_at_rest="f8",  # total time at rest, s
     end_time="f8",  # time at which the march ended, s
-    nodes="i8",  # number of nodes written to the table
-    events="i8",  # number of events written to the table
-    sequences="i8",  # number of sequences written to the table
-    uplifts="i8",  # number of uplifts so far
-    rests="i8",  # number of rests so far
+    node_count="i8",  # number of nodes written to the table
+    event_count="i8",  # number of events written to the table
+    sequence_count="i8",  # number of sequences written to the table
+    uplift_count="i8",  # number of uplifts so far
+    rest_count="i8",  # number of rests so far
     rests_by_rounding="i8",  # number of rests because time hardly advanced between impacts
     rounding_decisions="i8",  # number of contacts, or sides of uplift without weight, decided by rounding
     tendon_law="i8",  # `TendonLaw` of a tendon that yields
@@ -256,7 +256,7 @@ SCRATCH_DTYPE = define_struct(
     auxiliary=_SERIES,  # space for another series
     half_sine=_SERIES,  # sin(u/2)
     half_cosine=_SERIES,  # cos(u/2)
-    slip=_SERIES,  # velocity of the foot, or the horizontal force without slip, in the frame of the side
+    horizontal=_SERIES,  # velocity of the foot, or the horizontal force without slip, in the frame of the side
     normal=_SERIES,  # normal force
     undivided_normal=_SERIES,  # normal force times divisor
     squares=_SERIES,  # square of u'
@@ -265,7 +265,7 @@ SCRATCH_DTYPE = define_struct(
 )
 
 #: Scratch space of a variation: series of the stiffness, the forcing and the variation itself.
-VARIATION_DTYPE = define_struct(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)
+VARIATION_DTYPE = define_struct(stiffness=_SERIES, forcing=_SERIES, rotation=_SERIES)
 
 
 def create_structs(count: int, kind: np.dtype[np.void]) -> Structs:
@@ -336,7 +336,7 @@ _ROWS_PER_ITERATION = PROVEN_PER_ITERATION + 3
 @inlined
 def has_space(settings: Struct, table: Structs, state: Struct) -> bool:
     """Return whether the table has space for one iteration of the march."""
-    max_rows = max(max(state.nodes, state.impacts), max(state.events, state.sequences))
+    max_rows = max(max(state.node_count, state.impact_count), max(state.event_count, state.sequence_count))
     return not settings.writes_tables or max_rows + _ROWS_PER_ITERATION <= table.shape[0]
 
 
@@ -363,7 +363,7 @@ def write_node(ground: Ground, settings: Struct, table: Structs, state: Struct) 
     """Write the state."""
     if not settings.writes_tables:
         return
-    row = table[state.nodes].node
+    row = table[state.node_count].node
     row.time = piece_start(ground, state.piece) + state.offset
     row.piece = state.piece
     row.offset = state.offset
@@ -374,18 +374,18 @@ def write_node(ground: Ground, settings: Struct, table: Structs, state: Struct) 
     row.slip = state.slip
     row.slip_rate = state.slip_rate
     row.direction = state.direction
-    state.nodes += 1
+    state.node_count += 1
 
 
 @inlined
 def write_event(settings: Struct, table: Structs, state: Struct, time: float, kind: int) -> None:
     """Write an uplift, rest or overturning."""
     if settings.writes_tables:
-        row = table[state.events].event
+        row = table[state.event_count].event
         row.time = time
         row.kind = kind
         row.side = signed_side(state.side)
-    state.events += 1
+    state.event_count += 1
 
 
 @inlined
@@ -393,7 +393,7 @@ def write_impact(settings: Struct, table: Structs, state: Struct, time: float, s
     """Write the last impact, from the state after it and the speed before."""
     if not settings.writes_tables:
         return
-    row = table[state.impacts - 1].impact
+    row = table[state.impact_count - 1].impact
     row.time = time
     row.side = signed_side(state.side)
     row.speed_before = speed
@@ -410,10 +410,10 @@ def write_sequence(
     """
     lower, upper, time_to_rest = bounds
     if settings.writes_tables:
-        row = table[state.sequences].sequence
+        row = table[state.sequence_count].sequence
         row.start = state.sequence_start
         row.end = time + time_to_rest
         row.lower = time + lower
         row.upper = time + upper
         row.impacts = state.proven_impacts
-    state.sequences += 1
+    state.sequence_count += 1

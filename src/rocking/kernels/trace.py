@@ -219,7 +219,7 @@ def compute_variation(
             order = expand_variation(trail, scratch, variation, node, quantity, start, duration)
             write_changes(trail, scratch, variation, node, order, times[first:written], changes[first:written], False)
             t = compute_step_duration(trail, node, next_node)
-            du, dv, _ = evaluate_series(variation.change, order, t)
+            du, dv, _ = evaluate_series(variation.rotation, order, t)
             if node.tendon_law == TendonLaw.PLASTIC and next_node.tendon_law != node.tendon_law:
                 plastic_variation = compute_elongation_rate(trail, node.side, next_node.u) * du
             if is_impact(nodes, k):
@@ -269,7 +269,7 @@ def write_changes(
         t = times[n] - piece_start(trail.ground, node.piece) - node.offset
         u, _, _ = evaluate_series(scratch.rotation, order, t)
         if u > 0.0 or not is_last:
-            changes[n], _, _ = evaluate_series(variation.change, order, t)
+            changes[n], _, _ = evaluate_series(variation.rotation, order, t)
 
 
 @inlined
@@ -320,7 +320,7 @@ def compute_step_duration(trail: Trail, node: Struct, next_node: Struct) -> floa
 def expand_variation(
     trail: Trail, scratch: Struct, variation: Struct, node: Struct, quantity: int, start: Variations, duration: float
 ) -> int:
-    """Write the series of the variation along the arc from a node into ``variation.change``, and return its order.
+    """Write the series of the variation along the arc from a node into ``variation.rotation``, and return its order.
 
     ``start``: variations of rotation, velocity and a tendon's plastic elongation.
     """
@@ -336,7 +336,7 @@ def expand_variation(
     elif side_quantity != Quantity.MOTION:
         for k in range(order - 1):
             variation.forcing[k] = 0.0
-    variation.change[0], variation.change[1], plastic_elongation = start
+    variation.rotation[0], variation.rotation[1], plastic_elongation = start
     if plastic_elongation != 0.0 and node.tendon_law == TendonLaw.ELASTIC:
         change = trail.block.tendon_stiffness[node.side] * plastic_elongation
         for k in range(order - 1):

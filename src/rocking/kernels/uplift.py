@@ -47,11 +47,11 @@ def find_threshold(block: Struct, side: int) -> float:
 
 @not_inlined
 def find_next_uplift(
-    ground: Ground, block: Struct, scratch: Struct, resting: int, piece: int, offset: float, stop: float
+    ground: Ground, block: Struct, scratch: Struct, resting: int, piece: int, offset: float, stop_time: float
 ) -> Uplift:
     """Find the first instant from (piece, offset) at which the motion passes a threshold of a body at rest.
 
-    Without an uplift before ``stop``, the side is AT_REST and the piece the last one examined.
+    Without an uplift before ``stop_time``, the side is AT_REST and the piece the last one examined.
     """
     A, d = scratch.ground, scratch.auxiliary
     plus, minus = find_threshold(block, 0), find_threshold(block, 1)
@@ -62,7 +62,7 @@ def find_next_uplift(
         next_piece = find_piece_beyond(ground, piece, (-plus, minus), (-restraint_plus, restraint_minus))
         if next_piece > piece:
             piece, offset = next_piece, 0.0
-        if piece == last_piece(ground) or not piece_start(ground, piece) + offset < stop:
+        if piece == last_piece(ground) or not piece_start(ground, piece) + offset < stop_time:
             return Uplift(piece, offset, AT_REST, False)
         length = piece_length(ground, piece)
         remaining = length - offset
@@ -193,7 +193,7 @@ def write_completeness(
     for k in range(blocks.shape[0]):
         state = states[k]
         ground = select_ground(grounds, motions[k], factors[k])
-        complete[k] = state.rests > 0 and not exceeds_threshold_again(ground, blocks[k], scratch, state)
+        complete[k] = state.rest_count > 0 and not exceeds_threshold_again(ground, blocks[k], scratch, state)
 
 
 @inlined

@@ -173,7 +173,7 @@ def gradient(response: Response, quantity: GradientTarget = "peak", time_or_inde
     else:
         target = _target_time(response, quantity, time_or_index)
     trail = response.solution.trail
-    derivatives = np.zeros((len(trail.ground.pieces), trail.ground.columns * trail.ground.stretches.shape[1]))
+    derivatives = np.zeros((len(trail.ground.pieces), trail.ground.coefficient_count * trail.ground.stretches.shape[1]))
     by_state = np.zeros(3)
     reason = _UNFINISHED if response.unfinished else target.reason
     if response.rounding_decisions and not reason and _has_ties_before(trail, target.instant):
@@ -306,7 +306,7 @@ def _split_components(
     """Return derivatives by both components from derivatives by their common pieces."""
     if motion is None:
         return np.zeros((0, 2)), None
-    starts, columns = trail.ground.pieces[:-1, 0], trail.ground.columns
+    starts, columns = trail.ground.pieces[:-1, 0], trail.ground.coefficient_count
     horizontal = _sum_over_pieces(motion, starts, derivatives[:-1, :columns] / gravity)
     if motion.vertical is None:
         return horizontal, None

@@ -182,8 +182,8 @@ def find_impact_steps(nodes: Structs) -> Integers:
 def add_all_impacts(trail: Trail, *, ends_in_sequence: bool) -> Trail:
     """Return the trail with the impacts between the last resolved one of each chattering sequence and its rest.
 
-    ``cut``: whether the response ends within a sequence after its proof. Later impacts still exert forces, and are
-    computed as far as they contribute.
+    ``ends_in_sequence``: whether the response ends within a sequence after its proof. Later impacts still exert forces,
+    and are computed as far as they contribute.
     """
     nodes = trail.nodes
     # No rest follows the last impact if the duration ends within a sequence after its proof.
@@ -204,7 +204,7 @@ def add_all_impacts(trail: Trail, *, ends_in_sequence: bool) -> Trail:
         settings["stop_time"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.settings["stop_time"]
         while march(trail.ground, body, settings, table, scratch, start) == state.MarchStatus.FULL:
             table = state.enlarge_table(table)
-        later = table["node"][1 : start["nodes"]]
+        later = table["node"][1 : start["node_count"]]
         parts += [nodes[next_row : row + 1], later[(later["side"] >= 0) & (later["time"] < settings["stop_time"])]]
         next_row = row + 1
     return trail._replace(nodes=state.expose_fields(np.concatenate([*parts, nodes[next_row:]])))

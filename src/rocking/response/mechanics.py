@@ -186,7 +186,7 @@ class ContactForces:
 
 
 #: Number of points of a boundary, and its extent divided by the balance.
-_N_BOUNDARY: Final = 201
+_BOUNDARY_POINT_COUNT: Final = 201
 _MAX_RATIO: Final = 1.6
 
 #: Fields of a struct that determine the potential.
@@ -280,7 +280,7 @@ class EnergyModel:
         if not math.isfinite(balance):
             return np.empty(0), np.empty(0)
         farthest = min(_MAX_RATIO, 0.5 * math.pi / balance)
-        u = balance * np.union1d(np.linspace(0.0, farthest, _N_BOUNDARY), 1.0)
+        u = balance * np.union1d(np.linspace(0.0, farthest, _BOUNDARY_POINT_COUNT), 1.0)
         remaining = self.balance_energy[side] - self._potential(u, np.full(u.shape, side))
         speed = np.sqrt(2.0 * np.maximum(remaining, 0.0)) / (balance * self.p[side])
         return u / balance, speed

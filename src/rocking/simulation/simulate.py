@@ -130,7 +130,7 @@ def compute_response(
     status, table = march_in_slices(trail, body_state)
     if status == state.MarchStatus.BALANCED:
         raise OptionError("the block remains balanced on its corner; give {} or another initial state", "duration")
-    events = table["event"][: body_state["events"]]
+    events = table["event"][: body_state["event_count"]]
     overturned = status == state.MarchStatus.OVERTURNED
     return Response(
         block=block,
@@ -148,12 +148,12 @@ def compute_response(
         peak_time=float(body_state["peak_time"]),
         duration=float(body_state["end_time"]),
         events=_convert_events(events),
-        impacts=_convert_rows(table["impact"][: body_state["impacts"]], _IMPACT_DTYPE),
+        impacts=_convert_rows(table["impact"][: body_state["impact_count"]], _IMPACT_DTYPE),
         rests_by_rounding=int(body_state["rests_by_rounding"]),
         rounding_decisions=int(body_state["rounding_decisions"]),
         solution=Solution(
-            trail=trail._replace(nodes=state.expose_fields(np.array(table["node"][: body_state["nodes"]]))),
-            sequences=_convert_rows(table["sequence"][: body_state["sequences"]], _SEQUENCE_DTYPE),
+            trail=trail._replace(nodes=state.expose_fields(np.array(table["node"][: body_state["node_count"]]))),
+            sequences=_convert_rows(table["sequence"][: body_state["sequence_count"]], _SEQUENCE_DTYPE),
             residual=float(
                 block.stops[int(body_state["side"] in (1, -2))]
                 + (1 - 2 * body_state["side"]) * body_state["leaning_rotation"]
@@ -191,7 +191,7 @@ def march_in_slices(trail: Trail, body_state: state.Struct) -> tuple[int, state.
             status = march(ground, block, settings, table, scratch, body_state)
         if status != state.MarchStatus.PAUSED:
             return status, table
-    body_state["end_time"] = table["node"]["time"][body_state["nodes"] - 1]
+    body_state["end_time"] = table["node"]["time"][body_state["node_count"] - 1]
     body_state["status"] = state.MarchStatus.UNFINISHED
     return state.MarchStatus.UNFINISHED, table
 

@@ -10,16 +10,16 @@ from rocking.kernels.compiled import inlined, not_inlined
 from rocking.kernels.sine import SequenceStatus
 
 #: Orders of the sums, and the largest t^2 (1 + delta) at which they reach full precision.
-SHORT: Final = 3
-MEDIUM: Final = 5
-LONG: Final = 9
-LONGEST: Final = 14
+SHORT_ORDER: Final = 3
+MEDIUM_ORDER: Final = 5
+LONG_ORDER: Final = 9
+LONGEST_ORDER: Final = 14
 REACH_SHORT: Final = 0.003
 REACH_MEDIUM: Final = 0.12
 REACH_LONG: Final = 1.5
 REACH_LONGEST: Final = 12.0
 
-_INVERSE_FACTORIAL: Final = tuple(1.0 / math.factorial(k) for k in range(2 * LONGEST + 5))
+_INVERSE_FACTORIAL: Final = tuple(1.0 / math.factorial(k) for k in range(2 * LONGEST_ORDER + 5))
 
 
 class Basis(NamedTuple):
@@ -78,13 +78,13 @@ def compute_basis(t: float, delta: float) -> Basis:
     q = t * t
     reach = q * (1.0 + delta)
     if reach < REACH_SHORT:
-        return sum_basis(q, delta, SHORT)
+        return sum_basis(q, delta, SHORT_ORDER)
     if reach < REACH_MEDIUM:
-        return sum_basis(q, delta, MEDIUM)
+        return sum_basis(q, delta, MEDIUM_ORDER)
     if reach < REACH_LONG:
-        return sum_basis(q, delta, LONG)
+        return sum_basis(q, delta, LONG_ORDER)
     if reach < REACH_LONGEST:
-        return sum_basis(q, delta, LONGEST)
+        return sum_basis(q, delta, LONGEST_ORDER)
     return compute_closed_form_basis(t, delta)
 
 

@@ -151,14 +151,14 @@ export class Kernels {
     }
     const number = (/** @type {string} */ name) => this.get("state", state, name);
     const outcome = {
-      status, overturned: status === DATA.statuses.OVERTURNED, peak: number("peak"), peakTime: number("peak_time"), impacts: number("impacts"),
-      uplifts: number("uplifts"), rests: number("rests"), end: number("end_time"), firstUplift: number("first_uplift"), firstRest: number("first_rest"), lastRest: number("last_rest_time"),
+      status, overturned: status === DATA.statuses.OVERTURNED, peak: number("peak"), peakTime: number("peak_time"), impacts: number("impact_count"),
+      uplifts: number("uplift_count"), rests: number("rest_count"), end: number("end_time"), firstUplift: number("first_uplift"), firstRest: number("first_rest"), lastRest: number("last_rest_time"),
     };
     if (!recorded) return {...outcome, events: [], impactTimes: new Float64Array(0), nodes: new Uint8Array(0)};
     const row = (/** @type {number} */ k, /** @type {string} */ name) => this.get("table", table + k * size, name);
-    const events = Array.from({length: number("events")}, (_, k) => ({time: row(k, "event.time"), kind: row(k, "event.kind"), side: row(k, "event.side")}));
+    const events = Array.from({length: number("event_count")}, (_, k) => ({time: row(k, "event.time"), kind: row(k, "event.kind"), side: row(k, "event.side")}));
     const impactTimes = Float64Array.from({length: outcome.impacts}, (_, k) => row(k, "impact.time"));
-    const nodes = new Uint8Array(number("nodes") * DATA.layouts.node.size), [offset] = DATA.layouts.table.fields["node.time"];
+    const nodes = new Uint8Array(number("node_count") * DATA.layouts.node.size), [offset] = DATA.layouts.table.fields["node.time"];
     for (let k = 0; k * DATA.layouts.node.size < nodes.length; k += 1) {
       nodes.set(new Uint8Array(this.memory.buffer, table + k * size + offset, DATA.layouts.node.size), k * DATA.layouts.node.size);
     }
