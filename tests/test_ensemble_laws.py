@@ -74,7 +74,7 @@ def test_a_motion_times_a_factor_is_laid_out_as_the_scaled_motion(
     expected = prepare_ground(motion.scaled(factor), GRAVITY)
     assert ground_error(found) == pytest.approx(max(errors or (3e-3,)) * abs(factor) / GRAVITY, rel=1e-15)
     assert ground_error(found) == pytest.approx(ground_error(expected), rel=1e-15)
-    assert (found.columns, found.first) == (expected.columns, expected.first)
+    assert (found.coefficient_count, found.first_column) == (expected.coefficient_count, expected.first_column)
     pieces = np.arange(len(found.pieces))
     for k, scaled in enumerate(scale_coefficients(found, pieces)):
         assert_allclose(scaled, scale_coefficients(expected, pieces)[k], rtol=1e-14, atol=1e-15)

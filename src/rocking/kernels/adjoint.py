@@ -56,14 +56,14 @@ class AdjointEnd(IntEnum):
 
 @kernel
 def adjoint(
-    trail: Trail, scratch: Struct, variation: Struct, row: int, time: float, derivatives: Floats, out: Floats
+    trail: Trail, scratch: Struct, variation: Struct, row: int, time: float, adjoint: Floats, out: Floats
 ) -> int:
     """Propagate the derivatives of a number back to the start of the response; return the `AdjointEnd`.
 
     The derivatives are by u, v and plastic elongation at ``time`` after the node of a row; if infinite, at the end of
     its step, before an impact there. On return they refer to the start, and are 0 if the body has come to rest.
     Derivatives by the coefficients of piece k (units of g, horizontal first) are added to row k of ``out``, and
-    ``variation`` is scratch space (`state.VARIATION_DTYPE`). For two more ``derivatives``, see `add_rounding`.
+    ``variation`` is scratch space (`state.VARIATION_DTYPE`). For two more derivatives, see `add_rounding`.
     """
     block, nodes = trail.block, trail.nodes
     number = count_impacts(nodes, row)
@@ -71,42 +71,42 @@ def adjoint(
     for k in range(row, -1, -1):
         node = nodes[k]
         if node.side < 0 or (k < row and nodes[k + 1].side < 0):
-            end = propagate_through_rest(nodes, k, derivatives)
+            end = propagate_through_rest(nodes, k, adjoint)
             if end != AdjointEnd.CONTINUES:
                 return end
             continue
         t = compute_step_duration(trail, node, nodes[k + 1]) if k < row or time == math.inf else time
         if block.yielding:
             if k < row and is_plastic_end(nodes, k + 1):
-                derivatives[0] += compute_elongation_rate(trail, node.side, nodes[k + 1].u) * derivatives[2]
-                derivatives[2] = 0.0
+                adjoint[0] += compute_elongation_rate(trail, node.side, nodes[k + 1].u) * adjoint[2]
+                adjoint[2] = 0.0
                 plastic_elongation = find_plastic_elongation(trail, k)
             apply_tendon_law(block, node.tendon_law, plastic_elongation)
         order, _, degree = expand_arc(trail.ground, block, trail.settings, scratch, node, t)
         if k < row and nodes[k + 1].u == 0.0 and t > 0.0:
             number -= is_impact(nodes, k)
             _, v, _ = evaluate_series(scratch.rotation, order, t)
-            if not propagate_through_impact(trail, k, v, number, derivatives):
+            if not propagate_through_impact(trail, k, v, number, adjoint):
                 return AdjointEnd.GRAZES
         if t > 0.0:
-            if derivatives.shape[0] > _STATE_DERIVATIVES:
-                add_rounding(trail, scratch, k, order, t, derivatives)
-            propagate_through_arc(trail, scratch, variation, node, (order, degree), t, derivatives, out)
-    derivatives[0] += differentiate_start_plasticity(trail) * derivatives[2]
+            if adjoint.shape[0] > _STATE_DERIVATIVES:
+                add_rounding(trail, scratch, k, order, t, adjoint)
+            propagate_through_arc(trail, scratch, variation, node, (order, degree), t, adjoint, out)
+    adjoint[0] += differentiate_start_plasticity(trail) * adjoint[2]
     return AdjointEnd.START
 
 
 @inlined
-def add_rounding(trail: Trail, scratch: Struct, k: int, order: int, t: float, derivatives: Floats) -> None:
-    """Add a bound on the effect of rounding during a time t of the arc from the k-th node to ``derivatives[3]``.
+def add_rounding(trail: Trail, scratch: Struct, k: int, order: int, t: float, adjoint: Floats) -> None:
+    """Add a bound on the effect of rounding during a time t of the arc from the k-th node to ``adjoint[3]``.
 
-    ``derivatives[4]`` becomes the largest relative rate of decrease of a speed just before its impact.
+    ``adjoint[4]`` becomes the largest relative rate of decrease of a speed just before its impact.
     """
     ground, block, node = trail.ground, trail.block, trail.nodes[k]
     side, end = node.side, node.offset + t
     u, v, w = evaluate_series(scratch.rotation, order, t)
     if trail.nodes[k + 1].u == 0.0:
-        derivatives[4] = max(derivatives[4], -w / v)
+        adjoint[4] = max(adjoint[4], -w / v)
     speed = max(abs(node.v), abs(v))
     height = max(node.u, u) + speed * t
     push = 0.5 * ground.coefficient_count * sum_absolute_terms(ground, node.piece, end)[0] + abs(block.added_push[side])
@@ -118,36 +118,36 @@ def add_rounding(trail: Trail, scratch: Struct, k: int, order: int, t: float, de
     force += (abs(block.stiffness[side]) * (weight + push) + abs(block.spring[side])) * height
     force = _STEP_ROUNDING * (force + abs(block.prestress[side]) + block.damping[side] * speed)
     force += block.restoring_gain[side] * ground_error(ground)
-    derivatives[3] += abs(derivatives[0]) * (0.5 * _STEP_ROUNDING * (height + speed * t) + 0.5 * force * t * t)
-    derivatives[3] += abs(derivatives[1]) * (0.5 * _STEP_ROUNDING * speed + force * t)
-    derivatives[3] += abs(derivatives[0] * v + derivatives[1] * w) * _STEP_ROUNDING * end
+    adjoint[3] += abs(adjoint[0]) * (0.5 * _STEP_ROUNDING * (height + speed * t) + 0.5 * force * t * t)
+    adjoint[3] += abs(adjoint[1]) * (0.5 * _STEP_ROUNDING * speed + force * t)
+    adjoint[3] += abs(adjoint[0] * v + adjoint[1] * w) * _STEP_ROUNDING * end
 
 
 @inlined
-def propagate_through_rest(nodes: Structs, k: int, derivatives: Floats) -> int:
-    """Propagate ``derivatives`` back through a rest at the node or the one before; CONTINUES if a derivative remains.
+def propagate_through_rest(nodes: Structs, k: int, adjoint: Floats) -> int:
+    """Propagate ``adjoint`` back through a rest at the node or the one before; CONTINUES if a derivative remains.
 
     Impacts between the last resolved one and the rest have no effect.
     """
     if nodes[k].side >= 0:
         return AdjointEnd.CONTINUES
-    is_nonzero = derivatives[0] != 0.0 or derivatives[1] != 0.0
-    derivatives[0] = derivatives[1] = 0.0
+    is_nonzero = adjoint[0] != 0.0 or adjoint[1] != 0.0
+    adjoint[0] = adjoint[1] = 0.0
     if k == 0:
         return AdjointEnd.START
     # If the ground ends the rest immediately, landing and leaving have the same time.
     if is_nonzero and nodes[k + 1].time == nodes[k].time:
         return AdjointEnd.LEAVES_AT_ONCE
-    return AdjointEnd.REST if derivatives[2] == 0.0 else AdjointEnd.CONTINUES
+    return AdjointEnd.REST if adjoint[2] == 0.0 else AdjointEnd.CONTINUES
 
 
 @inlined
-def propagate_through_impact(trail: Trail, k: int, v: float, number: int, derivatives: Floats) -> bool:
+def propagate_through_impact(trail: Trail, k: int, v: float, number: int, adjoint: Floats) -> bool:
     """Propagate derivatives back through the impact after the k-th node, at velocity v; False if the body only touches.
 
     ``number`` is the number of earlier impacts.
     """
-    if derivatives[0] == 0.0 and derivatives[1] == 0.0:
+    if adjoint[0] == 0.0 and adjoint[1] == 0.0:
         return True
     node, next_node = trail.nodes[k], trail.nodes[k + 1]
     sign = -1.0 if trail.block.two_stops and next_node.side != node.side else 1.0  # the other stop
@@ -155,19 +155,16 @@ def propagate_through_impact(trail: Trail, k: int, v: float, number: int, deriva
         return False
     by_u = compute_saltation(trail, node, next_node, Quantity.ROTATION, -1.0 / v, (0.0, -sign * v), number)
     by_v = compute_saltation(trail, node, next_node, Quantity.ROTATION, 0.0, (sign, -sign * v), number)
-    derivatives[0], derivatives[1] = (
-        derivatives[0] * by_u[0] + derivatives[1] * by_u[1],
-        derivatives[0] * by_v[0] + derivatives[1] * by_v[1],
-    )
+    adjoint[0], adjoint[1] = adjoint[0] * by_u[0] + adjoint[1] * by_u[1], adjoint[0] * by_v[0] + adjoint[1] * by_v[1]
     return True
 
 
 @kernel
-def differentiate_step_end(trail: Trail, scratch: Struct, row: int, derivatives: Floats, out: Floats) -> int:
+def differentiate_step_end(trail: Trail, scratch: Struct, row: int, adjoint: Floats, out: Floats) -> int:
     """Write the derivative of the time at which the step of a row ends by the state before it; return the `AdjointEnd`.
 
     That state is at the end of the step, before an impact or an overturning, otherwise at its node. For an uplift or
-    rest, derivatives by the motion at that instant are added to ``out``, as in `adjoint`.
+    rest, derivatives by the motion at that instant are added to ``out``, as in `propagate_adjoint`.
     """
     block, nodes = trail.block, trail.nodes
     node, next_node = nodes[row], nodes[row + 1]
@@ -185,25 +182,23 @@ def differentiate_step_end(trail: Trail, scratch: Struct, row: int, derivatives:
             return AdjointEnd.START
         if not rate > 0.0:
             return AdjointEnd.TOUCHES_THRESHOLD
-        derivatives[2] = vary_tendon_restoring(block, side, plastic_elongation, 1.0) / (
-            block.restoring_gain[side] * rate
-        )
+        adjoint[2] = vary_tendon_restoring(block, side, plastic_elongation, 1.0) / (block.restoring_gain[side] * rate)
         add_instant(trail, next_node, (side_sign(side) / rate, block.threshold[side] / rate), out)
     elif next_node.side < 0:
-        differentiate_rest_time(trail, node, plastic_elongation, derivatives, out)
+        differentiate_rest_time(trail, node, plastic_elongation, adjoint, out)
     else:
         t = compute_step_duration(trail, node, next_node)
         order, _, _ = expand_arc(trail.ground, block, trail.settings, scratch, node, t)
         _, v, _ = evaluate_series(scratch.rotation, order, t)
         if v == 0.0:
             return AdjointEnd.GRAZES
-        derivatives[0] = -1.0 / v
+        adjoint[0] = -1.0 / v
     return AdjointEnd.START
 
 
 @inlined
 def differentiate_rest_time(
-    trail: Trail, node: Struct, plastic_elongation: float, derivatives: Floats, out: Floats
+    trail: Trail, node: Struct, plastic_elongation: float, adjoint: Floats, out: Floats
 ) -> None:
     """Write the derivatives of the time of rest after the impact of a node (see `trace.compute_rest_shift`)."""
     block, i = trail.block, node.side
@@ -217,19 +212,19 @@ def differentiate_rest_time(
     by_time = 1.0 - by_speed * g_i  # by the shift of the impact
     by_time += by_g_i * block.restoring_gain[i] * compute_push_rate(trail.ground, block, i, node.piece, node.offset)
     by_time += by_g_j * block.restoring_gain[j] * compute_push_rate(trail.ground, block, j, node.piece, node.offset)
-    derivatives[0], derivatives[1] = -by_time / node.v, by_speed
-    derivatives[2] = by_g_i * vary_tendon_restoring(block, i, plastic_elongation, 1.0)
-    derivatives[2] += by_g_j * vary_tendon_restoring(block, j, plastic_elongation, 1.0)
+    adjoint[0], adjoint[1] = -by_time / node.v, by_speed
+    adjoint[2] = by_g_i * vary_tendon_restoring(block, i, plastic_elongation, 1.0)
+    adjoint[2] += by_g_j * vary_tendon_restoring(block, j, plastic_elongation, 1.0)
     by_i, by_j = by_g_i * block.restoring_gain[i], by_g_j * block.restoring_gain[j]
     push = by_i * side_sign(i) + by_j * side_sign(j)
     add_instant(trail, node, (push, by_i * block.threshold[i] + by_j * block.threshold[j]), out)
 
 
 @inlined
-def add_instant(trail: Trail, node: Struct, derivatives: tuple[float, float], out: Floats) -> None:
-    """Add the derivatives by the coefficients of a node's piece from ``derivatives`` by push and weight at the node."""
+def add_instant(trail: Trail, node: Struct, adjoint: tuple[float, float], out: Floats) -> None:
+    """Add the derivatives by the coefficients of a node's piece from ``adjoint`` by push and weight at the node."""
     columns = trail.ground.coefficient_count
-    push, weight = derivatives
+    push, weight = adjoint
     for j in range(columns):
         out[node.piece, j] += push
         if has_vertical(trail.ground):
@@ -271,10 +266,10 @@ def propagate_through_arc(
     node: Struct,
     orders: tuple[int, int],
     t: float,
-    derivatives: Floats,
+    adjoint: Floats,
     out: Floats,
 ) -> None:
-    """Propagate ``derivatives`` back through a time t of the arc from a node, for the given order and degree."""
+    """Propagate ``adjoint`` back through a time t of the arc from a node, for the given order and degree."""
     order, degree = orders
     x = variation.rotation
     expand_unforced(trail, scratch, variation, node.side, degree, order)
@@ -285,14 +280,11 @@ def propagate_through_arc(
     x[0], x[1] = 0.0, 1.0
     write_variation_coefficients(variation, drag, order)
     u_by_v, v_by_v, _ = evaluate_series(x, order, t)
-    derivatives[0], derivatives[1] = (
-        derivatives[0] * u_by_u + derivatives[1] * v_by_u,
-        derivatives[0] * u_by_v + derivatives[1] * v_by_v,
-    )
+    adjoint[0], adjoint[1] = adjoint[0] * u_by_u + adjoint[1] * v_by_u, adjoint[0] * u_by_v + adjoint[1] * v_by_v
     ground, block = trail.ground, trail.block
-    if derivatives.shape[0] > _STATE_DERIVATIVES and not block.yielding:  # only the rounding is required
+    if adjoint.shape[0] > _STATE_DERIVATIVES and not block.yielding:  # only the rounding is required
         return
-    x[0], x[1] = derivatives[1], drag * derivatives[1] - derivatives[0]
+    x[0], x[1] = adjoint[1], drag * adjoint[1] - adjoint[0]
     write_variation_coefficients(variation, -drag, order)
     lam, gain, threshold = block.stiffness[node.side], block.restoring_gain[node.side], block.threshold[node.side]
     m = variation.forcing
@@ -302,9 +294,8 @@ def propagate_through_arc(
             m[k] = 0.0
             for j in range(k + 1):
                 m[k] -= lam * x[j] * scratch.cosine[k - j]
-    add_moments(
-        scratch.auxiliary, m, order, node.offset, t, side_sign(node.side), out[node.piece, : ground.coefficient_count]
-    )
+    row = out[node.piece, : ground.coefficient_count]
+    add_moments(scratch.auxiliary, m, order, node.offset, t, side_sign(node.side), row)
     if has_vertical(ground):
         for k in range(order - 1):  # times d u'' / d W
             m[k] = 0.0 if trail.settings.nonlinear else -gain * threshold * x[k]
@@ -313,7 +304,7 @@ def propagate_through_arc(
         add_moments(scratch.auxiliary, m, order, node.offset, t, 1.0, out[node.piece, ground.coefficient_count :])
     if block.yielding and node.tendon_law == TendonLaw.ELASTIC:
         write_plastic_series(trail, scratch, node.side, x, order, m)
-        add_moments(scratch.auxiliary, m, order, 0.0, t, 1.0, derivatives[2:_STATE_DERIVATIVES])
+        add_moments(scratch.auxiliary, m, order, 0.0, t, 1.0, adjoint[2:_STATE_DERIVATIVES])
 
 
 @inlined

@@ -272,10 +272,8 @@ def prove_slide(ground: Ground, block: Struct, settings: Struct, scratch: Struct
     if settings.nonlinear:
         divisor = compute_sliding_divisor(block, i, direction, max_height)
         divisor = min(divisor, compute_sliding_divisor(block, j, -direction, max_height))
-    arm, base = (
-        max(block.arm_over_g[0], block.arm_over_g[1]),
-        max(block.pivot_distance_over_g[0], block.pivot_distance_over_g[1]),
-    )
+    arm = max(block.arm_over_g[0], block.arm_over_g[1])
+    base = max(block.pivot_distance_over_g[0], block.pivot_distance_over_g[1])
     normal = (1.0 + motion.vertical.high) / min(1.0, divisor)
     along_arcs = mu * normal + bound_magnitude(motion.horizontal) + arm * (3.0 * max_restoring + max_speed * max_speed)
     at_impacts = 2.0 * (mu * base + block.height_over_g) * max_restoring

@@ -96,9 +96,8 @@ def select_ground(grounds: Grounds, motion: int, factor: float) -> Ground:
     """Return one of the motions, multiplied by a factor."""
     pieces = grounds.pieces[grounds.first_pieces[motion] : grounds.first_pieces[motion + 1]]
     stretches = grounds.stretches[grounds.first_stretches[motion] : grounds.first_stretches[motion + 1]]
-    return Ground(
-        pieces, stretches, grounds.errors[motion], grounds.coefficient_count, FIRST, factor, grounds.g_per_unit
-    )
+    count = grounds.coefficient_count
+    return Ground(pieces, stretches, grounds.errors[motion], count, FIRST, factor, grounds.g_per_unit)
 
 
 def scale_coefficients(ground: Ground, pieces: Integers) -> list[Floats]:

@@ -211,9 +211,8 @@ def build_step_rows(ground: Ground, block: Struct) -> Floats:
         rates = np.sum((series[..., 1:] * np.arange(1, _TERMS + 2) * powers[:, :-1])[..., ::-1], axis=-1)
         rows[side, :, :_OFFSET] = np.stack([values[0], values[1], rates[0], rates[1]], axis=-1)
         rows[side, :, _OFFSET], rows[side, :, _OFFSET + 1] = values[2], rates[2]
-        rows[side, :, _FORCE] = np.sum(np.abs(force) * powers[:, : ground.coefficient_count], axis=-1) * (
-            1.0 + ROUNDING
-        )
+        sizes = np.abs(force) * powers[:, : ground.coefficient_count]
+        rows[side, :, _FORCE] = np.sum(sizes, axis=-1) * (1.0 + ROUNDING)
         rows[side, :, _ROOT], rows[side, :, _RATE], rows[side, :, _LENGTH] = root, root + drag, length
     return rows
 

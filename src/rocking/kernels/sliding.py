@@ -370,12 +370,8 @@ def compute_slip_factor(block: Struct, side: int, e: float, direction: float) ->
 def strike_with_friction(block: Struct, state: Struct, side: int, speed: float) -> None:
     """Change speed, slip and mode at an impact that has left a side and would stick with the speed of the state."""
     other = 1 - side
-    j, h, d, next_d = (
-        side_sign(other),
-        block.height_over_g,
-        block.pivot_distance_over_g[side],
-        block.pivot_distance_over_g[other],
-    )
+    j, h = side_sign(other), block.height_over_g
+    d, next_d = block.pivot_distance_over_g[side], block.pivot_distance_over_g[other]
     inertia = block.arm_over_g[other] / block.stiffness[other]
     e = state.v / speed if speed > 0.0 else 0.0
     V = state.slip_rate
@@ -400,11 +396,8 @@ def strike_with_friction(block: Struct, state: Struct, side: int, speed: float) 
 def find_sticking_friction(block: Struct, side: int) -> float:
     """Compute the friction with which an impact that leaves a side sticks if nothing slips before (Eq. 7)."""
     e = block.restitution[side]
-    return (
-        block.height_over_g
-        * (1.0 - e)
-        / (block.pivot_distance_over_g[1 - side] * e + block.pivot_distance_over_g[side])
-    )
+    d, next_d = block.pivot_distance_over_g[side], block.pivot_distance_over_g[1 - side]
+    return block.height_over_g * (1.0 - e) / (next_d * e + d)
 
 
 @inlined
