@@ -157,6 +157,10 @@ def test_an_object_that_no_level_overturns_has_a_bound_instead_of_a_curve():
     assert found.tabulate()[1][0][6] == "> 0"
     beyond = assess(VASE, MOTIONS, hazard=rocking.HazardCurve([0.05, 0.2], [1e-1, 1e-3]), levels=[0.1, 0.2, 0.3])
     assert beyond.tabulate()[1][0][6] == "> 1000"  # at 0.2 m/s^2, the last point
+    # At no level an object whose friction is too low to rock overturns: it follows those that do.
+    sliding = VASE.with_labels(name="sliding", friction=0.05)
+    mixed = assess([sliding, VASE, STELE], MOTIONS, levels=12)
+    assert [item.name for item in mixed.objects] == ["vase", "stele", "sliding"]
 
 
 def test_friction_of_a_label_decides_whether_an_object_slides():

@@ -152,7 +152,7 @@ def assess(
     if not objects:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in failed.items())
         raise OptionError(escape_braces(f"no object can be assessed: {reasons}"))
-    objects.sort(key=lambda item: item.bound_vulnerability(hazard)[1])
+    objects.sort(key=lambda item: item.order_vulnerability(hazard))
     numbers = assign_clusters([*usable.values()], clusters)
     ranks = dict(zip(("rank_best", "rank_worst"), compute_ranks(objects, numbers, hazard, confidence), strict=True))
     data = create_dataset(objects, usable, intensity, ranks, {"model": model, "polarity": polarity})

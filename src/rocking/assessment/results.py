@@ -126,6 +126,11 @@ class ObjectAssessment:
         """Whether friction is so low that the object slides instead of rocking from rest."""
         return self.static_friction * self.body.gravity <= self.uplift_acceleration
 
+    def order_vulnerability(self, hazard: HazardCurve | None) -> tuple[bool, float, int]:
+        """Return a key for sorting, the most vulnerable first; objects that no level overturns are last."""
+        never_overturns = self.curve is None and not (self.share > 0.0).any()
+        return never_overturns, self.bound_vulnerability(hazard)[1], -int(np.sum(self.unscaled.overturned))
+
     def bound_vulnerability(self, hazard: HazardCurve | None) -> tuple[float, float, float]:
         """Return the return period of overturning, or without hazard curve the median, between its bounds."""
         if self.rate is not None:

@@ -46,6 +46,9 @@ _INPUTS_BY_HEADING: Final = {
     for suffix in ("", *SIDE_SUFFIXES, _DEVIATION_SUFFIX)
 }
 
+#: Inputs of numbers whose names are also words of other columns.
+_TEXTUAL_HEADINGS: Final = ("load", "lean", "offset", "spring", "thrust", "mass")
+
 _TRUTH_VALUES: Final = {"yes": True, "true": True, "1": True, "no": False, "false": False, "0": False, "": False}
 
 
@@ -245,6 +248,9 @@ def _read_rows(file: Path, expected: Collection[str]) -> tuple[list[_Heading], l
     if "name" not in [heading.name for heading in headings] and not headings[0].input:
         headings = [_Heading("name"), *headings[1:]]
     for k, heading in enumerate(headings):
+        texts = [row[k] for _, row in rows[first + 1 :] if row[k]]
+        if heading.input in _TEXTUAL_HEADINGS and not any(re.search(r"\d", text) for text in texts):
+            headings[k] = heading = _Heading(heading.name)  # a word such as "Load: full" describes no input
         if heading.name in [other.name for other in headings[:k]]:
             if heading.input or heading.name == "name":
                 message = f"two columns contain {heading.name}; remove one of them, or rename it"
