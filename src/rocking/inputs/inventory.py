@@ -248,7 +248,7 @@ def _read_rows(file: Path, expected: Collection[str]) -> tuple[list[_Heading], l
     if "name" not in [heading.name for heading in headings] and not headings[0].input:
         headings = [_Heading("name"), *headings[1:]]
     for k, heading in enumerate(headings):
-        texts = [row[k] for _, row in rows[first + 1 :] if row[k]]
+        texts = ["".join(row[k : k + 1]) for _, row in rows[first + 1 :]]
         if heading.input in _TEXTUAL_HEADINGS and not any(re.search(r"\d", text) for text in texts):
             headings[k] = heading = _Heading(heading.name)  # a word such as "Load: full" describes no input
         if heading.name in [other.name for other in headings[:k]]:
