@@ -58,6 +58,7 @@ def test_components_of_one_station_are_found_by_the_names_of_files(names, found)
     groups = groups_of(store)
     assert [len(group["rows"]) for group in groups] == [len(labels) for labels in found]
     for group, labels in zip(groups, found, strict=True):
+        assert any(name.lower().startswith(group["title"].lower()) for name in names)
         if len(labels) > 1:
             assert tuple(row["label"] for row in group["rows"]) == labels
             ups = [row for row in group["rows"] if row["is_up"]]

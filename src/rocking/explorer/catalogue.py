@@ -75,7 +75,7 @@ def list_records(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[st
     groups = []
     for group in [*_group_by_station(_list_shipped()), *_group_by_station(components)]:
         rows, first = [component.row for component in group], group[0]
-        title = ", ".join(first.origin) or (str(first.place[0]) if len(first.place) > 1 else "") or first.row["file"]
+        title = ", ".join(first.origin) or (rows[0]["file"] if rows[0]["key"] in first.place else str(first.place[0]))
         reason = " ".join(problems[row["key"]] for row in rows if row["key"] in problems)
         groups.append({"title": title, "reason": reason, "rows": rows})
     return {"groups": groups, "usage": uploads.count_usage()}
