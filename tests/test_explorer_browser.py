@@ -587,6 +587,13 @@ def test_an_assessment_is_that_of_the_package(opened):
         page.page.locator("#exports button", has_text="Report, HTML").click()
     report = Path(download.value.path()).read_text("utf-8")
     assert download.value.suggested_filename == "rocking-assessment-pga.html" and "Half of the motions" in report
+    page.page.emulate_media(media="print")
+    heading, value = (
+        page.page.locator(f"#records {cell}:has-text('{text}') >> nth=0").bounding_box()
+        for cell, text in (("th", "PGV"), ("td", "m/s"))
+    )
+    assert heading["x"] == value["x"] and page.js("python.scrollWidth <= python.clientWidth")
+    page.page.emulate_media(media="screen")
     page.page.locator("#records tr", has_text="China Lake, 090").locator("input").check()
     page.page.click("#assess")
     page.until("document.querySelectorAll('#statements li')[0].textContent.includes('of 3')")
