@@ -399,6 +399,9 @@ def test_all_that_is_drawn_can_be_dragged(opened):
     page.until("play.textContent === 'Pause'", "the block is let go")
     page.until("location.hash.includes('initial_rotation')", "the tilt is in the address")
     assert numbers(page)["initial_rotation"] > 0.02
+    page.js("location.hash = 'width=0.4&height=1.6&motion=one-sine:amplitude=4.4,frequency=2'")
+    page.until("page.given.amplitude === 4.4", "another pulse is shown")
+    assert page.js("page.strip.knobTime") == pytest.approx(0.125, abs=0.01)  # on the first of two equal lobes
     assert page.complaints == []
 
 
@@ -484,6 +487,14 @@ def test_the_keyboard_reaches_all_and_returns(opened):
     keys.press("End")
     page.until("document.getElementById('clock').textContent === '2.78 s'", "the time line is at its end")
     assert page.page.get_attribute("#time", "aria-valuetext") == "2.78 s"
+    page.page.click("[data-panel=tours]")
+    page.page.click(".tours button >> nth=0")
+    assert page.page.locator(".card p:focus").count() == 1
+    keys.press("Escape")
+    assert page.js(on) == "tours" and page.page.locator("#panel").is_hidden()
+    page.page.focus("#yes")
+    keys.press("Enter")
+    assert page.js(on) == "play"
 
 
 @pytest.mark.browser
@@ -508,6 +519,7 @@ def test_tours_point_at_what_is_on_the_screen(opened, width, height):
             outlined += 1
             assert min(place[:2]) > -1.0 and place[2] < width + 1.0 and place[3] < height + 1.0, title
         page.page.click(".card .main")
+    page.page.click("#close")
     assert len(seen) == 7 and outlined >= 16 and page.complaints == []
 
 
@@ -524,6 +536,10 @@ def test_no_panel_has_a_barrier(opened, width, scheme):
         found = page.js("axe.run().then(({violations}) => violations.map(({id, nodes}) => [id, nodes[0].html]))")
         assert found == [], panel
         assert page.js("document.documentElement.scrollWidth") <= width
+    left = "element.getBoundingClientRect().left"
+    assert page.js(
+        f"[...strip.querySelectorAll('text'), strip].every((element) => {left} >= strip.getBoundingClientRect().left)"
+    )
     assert page.complaints == []
 
 

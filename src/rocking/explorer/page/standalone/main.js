@@ -42,7 +42,7 @@ class Page {
     this.panels = /** @type {Record<string, any>} */ ({numbers: new Numbers(this), map: new MapView(this), phase: new Phase(this), tours: new Tours(this)});
     one("play").addEventListener("click", () => this.toggle());
     for (const [id, guess] of /** @type {[string, boolean][]} */ ([["yes", true], ["no", false]])) {
-      one(id).addEventListener("click", () => { this.guess = guess; this.play(); });
+      one(id).addEventListener("click", () => { this.guess = guess; this.play(); one("play").focus(); });
     }
     one("time").addEventListener("input", () => this.seek(this.shown.picture.from + (Number(/** @type {HTMLInputElement} */ (one("time")).value) / 1000) * (this.shown.picture.until - this.shown.picture.from)));
     for (const name of PANELS) {
@@ -68,7 +68,7 @@ class Page {
       return;
     }
     if (event.key === " ") { event.preventDefault(); this.toggle(); }
-    if (event.key === "Escape") this.open(null);
+    if (event.key === "Escape" && this.panel) this.leave();
   }
 
   /** Change some of the numbers. @param {Partial<import("./motions.js").Case>} patch */

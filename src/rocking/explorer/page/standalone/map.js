@@ -22,7 +22,7 @@ const KINDS = {
   pulses: {
     title: "Which pulses overturn it?", across: "length", up: "amplitude", needs: "a pulse", is: ({motion}) => !isRecord(motion),
     ends: (page) => { const longest = (4 * Math.PI) / page.shown.body.sides[0].p; return [[longest / 20, longest], [0, (12 * page.shown.uplift) / GRAVITY]]; },
-    legend: [["second", "stands, darker the more it turns"], ["over", "falls"]],
+    legend: [["second", "stands, bluer the more it turns"], ["over", "falls"]],
   },
   sines: {
     title: "After which sines does it rest?", across: "omega", up: "a", needs: "several cycles of a sine", is: ({motion}) => motion === "sine", ends: () => [[0.5, 8], [1, 1.1]],
@@ -159,7 +159,7 @@ export class MapView {
     for (const tick of [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10]) if (tick >= left && tick <= right) pen.fillText(short(tick), LEFT_AXIS + w * this.place(0, tick), h + 14);
     pen.fillText(label(this.quantity("across")), LEFT_AXIS + w / 2, h + 29);
     pen.textAlign = "right";
-    const ticks = Array.from({length: Math.floor((high - low) / step + 1e-9)}, (_, k) => low + (k + 1) * step).filter((tick) => this.place(1, tick) < 0.98), texts = written(ticks);
+    const ticks = Array.from({length: Math.floor((high - low) / step + 1e-9) + 1}, (_, k) => low + k * step).filter((tick) => this.place(1, tick) < 0.98), texts = written(ticks);
     ticks.forEach((tick, k) => pen.fillText(texts[k], LEFT_AXIS - 5, h * (1 - this.place(1, tick)) + 4));
     pen.save();
     pen.translate(11, h / 2);

@@ -6,7 +6,7 @@ import {isRecord, lengthOf, rateFor} from "./case.js";
 import {fixed, short} from "../numbers.js";
 import {written} from "../ticks.js";
 
-const LEFT = 58, RIGHT = 22, TOP = 18, GAP = 36, BOTTOM = 24;
+const LEFT = 80, RIGHT = 22, TOP = 18, GAP = 36, BOTTOM = 24;
 /** Share of the upper part. */
 const UPPER = 0.45;
 /** Ends of the axis of time, s. */
@@ -102,9 +102,10 @@ export class Strip {
     this.axis(stillGround, y, span > 1 ? [[plus, "balance"], [-minus, "balance"]] : [1, -1].map((sign) => [sign * mark * alpha, `${short(100 * sign * mark)} %`]));
     let peak = 0;
     acceleration.forEach((/** @type {number} */ each, /** @type {number} */ k) => { if (Math.abs(each) > Math.abs(acceleration[peak])) peak = k; });
-    if (!isRecord(given.motion)) { // the first time at which the peak is reached
-      const first = acceleration.findIndex((/** @type {number} */ each) => Math.abs(each) > 0.999 * Math.abs(acceleration[peak]));
-      peak = Math.max(first, 0);
+    if (!isRecord(given.motion)) { // the top of the first of equal lobes, which samples may miss by different amounts
+      const most = Math.abs(acceleration[peak]);
+      peak = Math.max(acceleration.findIndex((/** @type {number} */ each) => Math.abs(each) > 0.9 * most), 0);
+      while (Math.abs(acceleration[peak + 1]) > Math.abs(acceleration[peak])) peak += 1;
       this.knobTime = given.motion === "rectangular" ? lengthOf(given) : corners[peak];
     } else this.knobTime = corners[peak];
     this.sign = Math.sign(acceleration[peak]) || 1;
@@ -123,7 +124,7 @@ export class Strip {
     const texts = written(ticks);
     this.axes.replaceChildren(
       draw("path", {d: `M${LEFT} ${this.upper}H${right}M${LEFT} ${this.middle}H${right}${ticks.map((each) => `M${this.x(each)} ${foot - 4}v4`).join("")}`}),
-      text(LEFT, 11, stillGround ? "the ground is at rest while the block is tilted" : "ground, g", "start"), text(LEFT, TOP + (this.height - TOP - GAP - BOTTOM) * UPPER + 14, "rotation", "start"),
+      text(LEFT, 13, stillGround ? "the ground is at rest while the block is tilted" : "ground, g", "start"), text(LEFT, TOP + (this.height - TOP - GAP - BOTTOM) * UPPER + 14, "rotation", "start"),
       text(LEFT - 6, this.upper - uplift * this.unit + 4, short(uplift / GRAVITY, 2)), text(LEFT - 6, this.upper + 4, uplift * this.unit > 12 ? "0" : ""),
       ...turns.map(([turned, words]) => text(LEFT - 6, y(turned) + 4, words)), text(LEFT - 6, this.middle + 4, "0"),
       ...ticks.map((each, k) => text(this.x(each), foot + 14, k === ticks.length - 1 ? `${texts[k]} s` : texts[k], "middle")),
