@@ -94,13 +94,14 @@ def coarsely() -> Callable[[], AbstractContextManager[None]]:
     @contextmanager
     def shortened() -> Iterator[None]:
         with pytest.MonkeyPatch.context() as patched:
-            patched.setattr(search, "_PROPOSAL_SIZES", (64, 1))
-            patched.setattr(search, "_COMPARISON_SIZES", (64, 2))
+            patched.setattr(search, "_SAMPLE_COUNT", 64)
+            patched.setattr(search, "_PROPOSAL_ROUND_COUNT", 1)
+            patched.setattr(search, "_COMPARISON_ROUND_COUNT", 2)
             patched.setattr(search, "_ANNEALING_EXPONENTS", (0.1, 1.0))
             patched.setattr(search, "_MAX_EXTENSIONS", 0)
             patched.setattr(history, "_START_COUNT", 256)
             patched.setattr(history, "_FIT_STAGES", ((0.15, 6), (0.3, 3), (1.0, 1)))
-            patched.setattr(history, "_CLOUD_SIZE", 16)
+            patched.setattr(history, "_CLOUD_POINT_COUNT", 16)
             yield
 
     return shortened

@@ -632,7 +632,7 @@ def fragilities() -> Iterator[Item]:
 
 @group(digits=6)
 def bands() -> Iterator[Item]:
-    options = {"trials": [10, 10, 10, 9, 10], "confidence": 0.95}
+    options = {"trial_counts": [10, 10, 10, 9, 10], "confidence": 0.95}
     yield from of_result(rocking.fit_fragility([1.0, 2.0, 3.0, 4.0, 5.0], [0, 2, 4, 7, 9], **options))
 
 
@@ -641,7 +641,7 @@ SITE: Final = rocking.HazardCurve([0.3, 0.5, 1.0, 2.0, 5.0, 10.0], [0.2, 0.1, 0.
 
 @group(digits=6)
 def risks() -> Iterator[Item]:
-    fitted = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0, 5.0], [0, 2, 4, 7, 10], trials=10)
+    fitted = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0, 5.0], [0, 2, 4, 7, 10], trial_counts=10)
     yield from of_result(fitted.annual_rate(SITE))
     yield from of_result(SITE)
     yield from of_result(fitted.survival(1000.0, SITE))
@@ -1069,7 +1069,7 @@ def studies() -> Iterator[Item]:
         yield from of_result(study.fragility(limit_states=LIMITS))
         yield from of_result(study.block_fragilities(**QUIET))
         yield from of_result(study.spectrum(**QUIET))
-        yield "verified", study.verify(recompute=1)
+        yield "verified", study.verify(recompute_count=1)
         for critical in (None, "overturning"):
             yield "table", saved(study.to_csv, critical=critical)
 

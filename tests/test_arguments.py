@@ -107,7 +107,7 @@ SITE = rocking.HazardCurve([0.5, 1.0, 2.0], [0.1, 0.01, 0.001])
 
 @cache
 def fitted():
-    return rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10)
+    return rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trial_counts=10)
 
 
 @cache
@@ -138,7 +138,7 @@ TAKES_ONE_THING = {
     "limit_states": lambda value: rocking.fragility(BLOCK, [MOTION], limit_states=value),
     "polarity": lambda value: rocking.fragility(BLOCK, [MOTION], polarity=value),
     "polarity of an ensemble": lambda value: rocking.simulate_many(BLOCK, MOTION, polarity=value),
-    "confidence": lambda value: rocking.fit_fragility([2.0, 3.0], [1, 2], trials=3, confidence=value),
+    "confidence": lambda value: rocking.fit_fragility([2.0, 3.0], [1, 2], trial_counts=3, confidence=value),
     "hazard curve": lambda value: fitted().annual_rate(value),
     "limit state": lambda value: fitted().curve(value),
     "intensity of a probability": lambda value: fitted().curves[0].probability(value),

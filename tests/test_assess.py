@@ -181,7 +181,7 @@ def test_an_uncertain_object_is_sampled(tmp_path):
     path = tmp_path / "inventory.csv"
     path.write_text("name,width,height\nknown,0.24,1.1\nuncertain,0.24 +- 0.03,1.1\n")
     inventory = rocking.read_inventory(path)
-    found = {item.name: item for item in assess(inventory, MOTIONS, levels=10, samples=20).objects}
+    found = {item.name: item for item in assess(inventory, MOTIONS, levels=10, sample_count=20).objects}
     assert (found["known"].samples, found["uncertain"].samples) == (1, 20)
     assert found["uncertain"].curve.dispersion > found["known"].curve.dispersion
     pooled = rocking.fragility(inventory.sample(1, 20), MOTIONS, levels=found["uncertain"].levels, polarity="both")

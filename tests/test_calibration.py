@@ -319,8 +319,7 @@ def test_the_posterior_is_that_of_brute_force(threshold_evidence):
 def test_a_search_goes_on_while_few_candidates_speak_for_what_it_found(
     threshold_evidence, monkeypatch, candidates, goes_on, populations
 ):
-    monkeypatch.setattr(searching, "_PROPOSAL_SIZES", (populations, 2))
-    monkeypatch.setattr(searching, "_COMPARISON_SIZES", (populations, 4))
+    monkeypatch.setattr(searching, "_SAMPLE_COUNT", populations)
     evidence, thresholds = threshold_evidence
     space = evidence.candidates.space
 
@@ -413,7 +412,7 @@ def test_one_candidate_predicts_no_certainty(threshold_evidence):
 def test_the_density_is_that_of_what_is_drawn():
     rng = np.random.default_rng(5)
     populations = np.array([[0.0, 1.0, 2.0, -2.3, -1.7, -2.9], [0.2, 1.1, 2.1, -2.3, -2.3, -2.3]])
-    points = searching.draw_points(populations, 1.5, 40_000, rng)
+    points = searching.sample_points(populations, 1.5, 40_000, rng)
     few = points[:100, None]
     centre, dispersion = searching.split_populations(populations)
     parts = norm.pdf(few, centre, 1.5 * dispersion).prod(axis=2)

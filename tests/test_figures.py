@@ -31,7 +31,7 @@ from rocking.plot.curves import (
     draw_survival,
 )
 from rocking.plot.maps import draw_basins, draw_outcome_map, draw_regions, draw_rose
-from rocking.plot.orbits import draw_bifurcation, draw_branches, draw_intervals, draw_orbit
+from rocking.plot.orbits import draw_bifurcation, draw_branches, draw_orbit, render_intervals
 
 COLUMN, PAGE = 86.0 / 25.4, 174.0 / 25.4
 LONG = "rectangular block, 0.24 m x 1.1 m, restitution = 0.9318234567890123, under ridgecrest-clc-090, nonlinear model"
@@ -125,7 +125,7 @@ def outcomes_of(**options):
 
 def intervals_of(count=60, **options):
     intervals = 0.5 * 0.9 ** np.arange(count) * np.where(np.arange(count) % 2, 0.1, 1.0)
-    return draw_intervals(intervals=intervals, eta=0.9, **options)
+    return render_intervals(intervals=intervals, eta=0.9, **options)
 
 
 def trials_of(sides=2, **options):

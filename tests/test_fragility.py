@@ -48,7 +48,7 @@ def test_the_fit_has_the_largest_likelihood(seed):
 
 
 def test_two_stripes_are_fitted_exactly():
-    curve = fit_fragility([2.0, 5.0], [2, 7], trials=10).curves[0]
+    curve = fit_fragility([2.0, 5.0], [2, 7], trial_counts=10).curves[0]
     np.testing.assert_allclose(curve.probability([2.0, 5.0]), [0.2, 0.7], rtol=1e-12)
     dispersion = math.log(2.5) / (stats.norm.ppf(0.7) - stats.norm.ppf(0.2))
     assert curve.dispersion == pytest.approx(dispersion, rel=1e-12)
@@ -56,7 +56,7 @@ def test_two_stripes_are_fitted_exactly():
 
 
 def test_counts_and_single_outcomes_are_the_same_data():
-    counted = fit_fragility([2.0, 3.0, 4.0], [1, 2, 4], trials=5).curves[0]
+    counted = fit_fragility([2.0, 3.0, 4.0], [1, 2, 4], trial_counts=5).curves[0]
     outcome = (np.arange(5) < np.array([[1], [2], [4]])).ravel()
     single = fit_fragility(np.repeat([2.0, 3.0, 4.0], 5), outcome).curves[0]
     assert single.median == pytest.approx(counted.median, rel=1e-10)
@@ -87,7 +87,7 @@ def test_fishers_covariance_is_the_inverse_of_the_expected_curvature():
     intensity = np.array([1.0, 2.0, 3.0, 4.0])
     trials = np.full(4, 1_000_000)
     exceeded = np.rint(trials * stats.norm.cdf(np.log(intensity / 2.5) / 0.5))
-    curve = fit_fragility(intensity, exceeded, trials=trials).curves[0]
+    curve = fit_fragility(intensity, exceeded, trial_counts=trials).curves[0]
     best = np.array([curve.fitted.intercept[0], curve.fitted.slope[0]])
 
     def negative(x):
@@ -199,7 +199,7 @@ def test_the_region_of_clusters_has_the_covariance_of_leaving_each_out():
 
 
 def test_outcomes_that_hardly_depend_on_the_intensity_leave_the_dispersion_without_an_upper_end():
-    curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [2, 1, 3, 2], trials=4).curves[0]
+    curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [2, 1, 3, 2], trial_counts=4).curves[0]
     assert curve.dispersion_interval[1] == math.inf
     low, high = curve.median_interval
     assert 0.0 <= low < curve.median < high <= math.inf
@@ -237,7 +237,7 @@ def test_a_band_holds_the_curve():
     # Each of the outcomes counts alone: the bands are those of four hundred, in a tenth of the time.
     intensity, at = np.linspace(1.0, 9.0, 20), np.linspace(0.0, 10.0, 41)
     exceeded = np.random.default_rng(3).binomial(20, stats.norm.cdf(np.log(intensity / 3.0) / 0.4))
-    curve = fit_fragility(intensity, exceeded, trials=20).curves[0]
+    curve = fit_fragility(intensity, exceeded, trial_counts=20).curves[0]
     low, high = curve.band(at)
     assert np.all(low <= curve.probability(at))
     assert np.all(curve.probability(at) <= high)
@@ -246,7 +246,8 @@ def test_a_band_holds_the_curve():
 @pytest.mark.parametrize("apart", [0.3, 1e-6])
 def test_the_covariance_of_close_intensities_is_that_of_wide_ones(apart):
     wide, close = (
-        fit_fragility(3.0 * np.exp(share * np.arange(4)), [2, 4, 5, 8], trials=10).curves[0] for share in (1.0, apart)
+        fit_fragility(3.0 * np.exp(share * np.arange(4)), [2, 4, 5, 8], trial_counts=10).curves[0]
+        for share in (1.0, apart)
     )
     # The same data but for the unit of ln x; the error of the slope is in proportion.
     assert close.covariance[1, 1] * apart**2 == pytest.approx(wide.covariance[1, 1], rel=1e-5)
@@ -255,7 +256,7 @@ def test_the_covariance_of_close_intensities_is_that_of_wide_ones(apart):
 
 def test_the_test_of_fit_is_pearsons_over_stripes():
     intensity, exceeded = np.array([1.0, 2.0, 3.0, 4.0, 5.0]), np.array([1, 4, 11, 13, 19])
-    found = fit_fragility(intensity, exceeded, trials=20)
+    found = fit_fragility(intensity, exceeded, trial_counts=20)
     (curve,) = found.curves
     assert found.summary().splitlines()[3].split()[-1] == f"{curve.goodness.p_value:.2g}"
     chance = curve.probability(intensity)
@@ -284,7 +285,7 @@ def test_a_cloud_has_every_motion_at_its_own_intensity(alpha):
     for curve, limit in zip(result.curves, (0.3, math.inf), strict=True):
         np.testing.assert_allclose(curve.intensity, [motion.pga for motion in motions], rtol=1e-12)
         passed = [verdict.overturned or verdict.peak_rotation / 0.2 > limit for verdict in verdicts]
-        np.testing.assert_array_equal(curve.exceeded, passed)
+        np.testing.assert_array_equal(curve.exceedance_counts, passed)
     assert result.curve("part").median < result.curve("overturning").median
 
 
@@ -299,11 +300,11 @@ def test_stripes_scale_every_motion_to_every_level():
     # A symmetric block under a motion and its mirror image does the same, which is one outcome.
     for block, signs in ((BLOCK, (1.0,)), (sided, (1.0, -1.0))):
         curve = fragility(block, PULSES, levels=levels, polarity="both").curves[0]
-        assert curve.trials.sum() == 3 * 13 * len(signs)
+        assert curve.trial_counts.sum() == 3 * 13 * len(signs)
         for level in levels:
             scaled = [pulse.scaled_to(level).scaled(sign) for pulse in PULSES for sign in signs]
             fell = [rocking.simulate(block, motion).overturned for motion in scaled]
-            assert curve.exceeded[curve.intensity == level].sum() == sum(fell)
+            assert curve.exceedance_counts[curve.intensity == level].sum() == sum(fell)
 
 
 def test_a_blocks_own_measures_are_multiples_of_those_of_the_motion():
@@ -328,7 +329,7 @@ def test_similar_blocks_pool_in_their_own_units():
     ]
     assert alone[0].median == pytest.approx(alone[1].median, rel=1e-9)
     pooled = fragility(Blocks.from_bodies(blocks), PULSES, measure="pga_ratio", levels=levels).curves[0]
-    assert pooled.trials.sum() == 2 * 13 * 9
+    assert pooled.trial_counts.sum() == 2 * 13 * 9
 
 
 def test_two_sided_blocks_count_in_the_units_of_the_side_that_lifts_first():
@@ -350,7 +351,7 @@ def test_the_figure_shows_curves_bands_and_shares():
 
 
 @pytest.mark.parametrize(
-    ("intensity", "exceeded", "sentence"),
+    ("intensity", "exceedance_counts", "sentence"),
     [
         (
             [1.0, 2.0, 3.0],
@@ -376,9 +377,9 @@ def test_the_figure_shows_curves_bands_and_shares():
         ([1.0], [1], r"every outcome of 1 exceeds the limit, at 1 m/s\^2 \(0.102 g\); use weaker"),
     ],
 )
-def test_outcomes_without_a_best_lognormal_are_refused_in_one_sentence(intensity, exceeded, sentence):
+def test_outcomes_without_a_best_lognormal_are_refused_in_one_sentence(intensity, exceedance_counts, sentence):
     with pytest.raises(rocking.errors.OptionError, match=f"'overturning': .*{sentence}"):
-        fit_fragility(intensity, exceeded)
+        fit_fragility(intensity, exceedance_counts)
 
 
 @pytest.mark.parametrize(
@@ -386,22 +387,22 @@ def test_outcomes_without_a_best_lognormal_are_refused_in_one_sentence(intensity
     [
         ({"intensity": [1.0, -2.0, 3.0]}, "intensity"),
         ({"intensity": []}, "intensity"),
-        ({"exceeded": [0, 1]}, "exceeded"),
-        ({"exceeded": [0, 2, 1]}, "trials"),
-        ({"exceeded": [0.5, 1, 1]}, "whole"),
-        ({"trials": 0}, "trials"),
+        ({"exceedance_counts": [0, 1]}, "exceedance_counts"),
+        ({"exceedance_counts": [0, 2, 1]}, "trial_counts"),
+        ({"exceedance_counts": [0.5, 1, 1]}, "whole"),
+        ({"trial_counts": 0}, "trial_counts"),
         ({"clusters": [1, 2]}, "clusters"),
         ({"clusters": [[1], [1, 2], 3]}, "clusters"),
         ({"clusters": "abc"}, "clusters"),
         ({"intensity": [1e-60, 1.0, 2.0]}, "intensity"),
-        ({"trials": 1e300}, "trials"),
+        ({"trial_counts": 1e300}, "trial_counts"),
         ({"confidence": 1.0}, "confidence"),
     ],
 )
 def test_data_that_cannot_be_fitted_are_refused(changes, word):
-    arguments = {"intensity": [1.0, 2.0, 3.0], "exceeded": [1, 0, 1]} | changes
+    arguments = {"intensity": [1.0, 2.0, 3.0], "exceedance_counts": [1, 0, 1]} | changes
     with pytest.raises(rocking.errors.OptionError, match=word):
-        fit_fragility(arguments.pop("intensity"), arguments.pop("exceeded"), **arguments)
+        fit_fragility(arguments.pop("intensity"), arguments.pop("exceedance_counts"), **arguments)
 
 
 @pytest.mark.parametrize(
@@ -420,9 +421,9 @@ def test_studies_that_make_no_fragility_are_refused(changes, word):
 
 def test_a_constant_share_contradicts_a_curve_that_rises_and_a_nearly_constant_one_puts_its_median_out_of_reach():
     with pytest.raises(rocking.errors.OptionError, match="the fitted curve does not rise"):
-        fit_fragility([1.0, 2.0, 3.0], [2, 2, 2], trials=4)
+        fit_fragility([1.0, 2.0, 3.0], [2, 2, 2], trial_counts=4)
     with pytest.raises(rocking.errors.OptionError, match="above all intensities by a factor of more than 1000"):
-        fit_fragility([1.0, 2.0, 3.0], [20, 20, 21], trials=100)
+        fit_fragility([1.0, 2.0, 3.0], [20, 20, 21], trial_counts=100)
 
 
 def test_a_block_of_weight_two_counts_as_two_blocks():
@@ -459,7 +460,7 @@ def test_a_block_of_weight_zero_is_none_of_the_data():
     assert both.intensity_range == alone.intensity_range
     assert one.is_independent and one.goodness.degrees_of_freedom == other.goodness.degrees_of_freedom
     assert one.goodness.p_value == pytest.approx(other.goodness.p_value, rel=1e-9)
-    assert one.trials.sum() == other.trials.sum() == len(motions)
+    assert one.trial_counts.sum() == other.trial_counts.sum() == len(motions)
     assert one.median_interval == pytest.approx(other.median_interval, rel=1e-9)
     # The table still has both blocks' simulations; the figure is drawn without a warning.
     assert both.outcomes.groupby("block").weight.unique().tolist() == [[1.0], [0.0]]
@@ -501,8 +502,8 @@ def test_what_cannot_be_told_is_left_out_with_its_reason():
 
 def test_outcomes_of_one_cluster_at_one_intensity_are_no_independent_trials():
     levels, exceeded = [1.0, 2.0, 3.0, 4.0, 5.0], [2, 20, 50, 70, 100]
-    independent = fit_fragility(levels, exceeded, trials=100).curves[0]
-    together = fit_fragility(levels, exceeded, trials=100, clusters=range(5)).curves[0]
+    independent = fit_fragility(levels, exceeded, trial_counts=100).curves[0]
+    together = fit_fragility(levels, exceeded, trial_counts=100, clusters=range(5)).curves[0]
     assert independent.is_independent
     assert not together.is_independent
     assert math.isfinite(independent.goodness.p_value)

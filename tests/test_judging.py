@@ -32,12 +32,12 @@ def test_perfect_predictions_score_zero_and_have_skill_one():
     found = rocking.validate(of_outcomes(outcomes), left_out(outcomes))
     for score in (found.brier, found.log_loss):
         assert (score.value, score.error, score.skill, score.skill_error) == (0.0, 0.0, 1.0, 0.0)
-    assert found.reliability_chance == 1.0
+    assert found.reliability_p_value == 1.0
 
 
 def test_what_was_thought_nearly_impossible_has_the_least_chance():
     found = rocking.validate(of_outcomes([1] * 12), left_out([0.02] * 12), simulation_count=400)
-    assert found.reliability_chance == pytest.approx(1.0 / 401.0)
+    assert found.reliability_p_value == pytest.approx(1.0 / 401.0)
 
 
 def test_the_base_rate_has_no_skill():
@@ -104,7 +104,7 @@ def chances_are_even(chances):
 def test_of_right_predictions_chances_are_even_and_bands_hold(monkeypatch, sets):
     rng = np.random.default_rng(2)
     found = [seen_by(rng.lognormal(0.0, 0.4, 40), rng, monkeypatch) for _ in range(sets)]
-    assert chances_are_even([one.reliability_chance for one in found])
+    assert chances_are_even([one.reliability_p_value for one in found])
     inside = [
         each.band_lower - 1e-9 <= each.observed <= each.band_upper + 1e-9 for one in found for each in one.reliability
     ]
@@ -122,7 +122,7 @@ def test_of_right_predictions_chances_are_even_and_bands_hold(monkeypatch, sets)
 def test_predictions_that_are_wrong_are_found_out(monkeypatch, wrong):
     rng = np.random.default_rng(4)
     found = seen_by(wrong * rng.lognormal(0.0, 0.4, 40), rng, monkeypatch)
-    assert found.reliability_chance < 0.05 and "not as if the predictions were right" in found.summary()
+    assert found.reliability_p_value < 0.05 and "not as if the predictions were right" in found.summary()
 
 
 # What predicts
@@ -154,8 +154,8 @@ def test_a_known_block_is_certain_and_a_lapse_is_not():
     assert [test.probability for test in found.tests] == [1.0, 0.0] and math.isinf(found.log_loss.value)
     assert any("a certain prediction failed" in note for note in found.notes)
     assert any("no test overturned" in note for note in found.notes) and math.isnan(found.brier.skill)
-    with_outliers = rocking.validate(tests, BLOCK, outlier_probability=0.01)
-    assert [test.probability for test in with_outliers.tests] == pytest.approx([0.99, 0.01])
+    include_outliers = rocking.validate(tests, BLOCK, outlier_probability=0.01)
+    assert [test.probability for test in include_outliers.tests] == pytest.approx([0.99, 0.01])
     assert "all tests overturned" in rocking.validate([ShakeTest(STRONG, True)], BLOCK).summary()
 
 

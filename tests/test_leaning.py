@@ -161,8 +161,8 @@ def test_a_table_and_a_fragility_count_what_leans_as_standing():
     assert rows.residual_rotation_rad[rows.leans].abs().between(0.1, 0.25).all()
     pulses = [PULSES[0], rocking.pulses.one_sine(3.0, 1.1)]
     found = rocking.fragility(BODIES["yields"], pulses, levels=[3.0, 3.56, 4.0, 5.0, 6.0])
-    assert (found.curves[0].trials.sum(), found.missing_note) == (10, "")
-    assert found.outcomes.overturned.sum() == found.curves[0].exceeded.sum()
+    assert (found.curves[0].trial_counts.sum(), found.missing_note) == (10, "")
+    assert found.outcomes.overturned.sum() == found.curves[0].exceedance_counts.sum()
     (held,) = found.outcomes.index[(found.outcomes.pga_m_s2 == 3.56) & (found.outcomes.motion == "one-sine #1")]
     assert not found.outcomes.overturned[held]
     assert 0.0 < found.outcomes.peak_over_alpha[held] < 2.0

@@ -108,7 +108,7 @@ def test_a_continuous_function_gives_the_probabilities_of_the_curve(result, tmp_
     ],
 )
 def test_units_are_openquakes(tmp_path, measure, imt, unit):
-    fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [1, 4, 7, 9], trials=10, measure=measure, block=BLOCK)
+    fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [1, 4, 7, 9], trial_counts=10, measure=measure, block=BLOCK)
     (function,) = check_shape(written(fitted, tmp_path / "model.xml"))
     imls, params = function
     assert imls.get("imt") == imt
@@ -120,7 +120,7 @@ def test_units_are_openquakes(tmp_path, measure, imt, unit):
 def test_a_spectral_acceleration_of_another_damping_is_none_of_openquakes(tmp_path):
     path, data = tmp_path / "model.xml", ([1.0, 2.0, 3.0, 4.0], [1, 4, 7, 9])
     light, usual = (
-        fit_fragility(*data, trials=10, measure=rocking.Measure("sa", period=0.5, damping=damping))
+        fit_fragility(*data, trial_counts=10, measure=rocking.Measure("sa", period=0.5, damping=damping))
         for damping in (0.02, 0.05)
     )
     with pytest.raises(rocking.errors.OptionError, match=r"damping .* must be 0.05 of critical .* got 0.02"):
@@ -153,19 +153,19 @@ def test_what_nrml_does_not_allow_is_refused(result, tmp_path, options, word):
 
 
 def test_a_limit_state_that_is_no_identifier_is_refused(tmp_path):
-    named = fit_fragility([1.0, 2.0, 3.0], {"half way": [1, 2, 3]}, trials=4)
+    named = fit_fragility([1.0, 2.0, 3.0], {"half way": [1, 2, 3]}, trial_counts=4)
     with pytest.raises(rocking.errors.OptionError, match="limit state"):
         named.to_nrml(tmp_path / "model.xml")
 
 
 def test_a_curve_too_flat_for_a_mean_is_refused(tmp_path):
-    flat = fit_fragility([1.0, 2.0, 3.0], [4999, 5000, 5010], trials=10000)
+    flat = fit_fragility([1.0, 2.0, 3.0], [4999, 5000, 5010], trial_counts=10000)
     assert flat.curves[0].dispersion > 100.0
     with pytest.raises(rocking.errors.OptionError, match="too large for the mean"):
         flat.to_nrml(tmp_path / "model.xml")
 
 
 def test_data_below_the_blocks_uplift_have_no_range_of_validity(tmp_path):
-    below = fit_fragility([0.5, 1.0, 1.5], [1, 2, 3], trials=4, block=BLOCK)
+    below = fit_fragility([0.5, 1.0, 1.5], [1, 2, 3], trial_counts=4, block=BLOCK)
     with pytest.raises(rocking.errors.OptionError, match="above the uplift of the block"):
         below.to_nrml(tmp_path / "model.xml")

@@ -178,10 +178,10 @@ def test_only_the_larger_response_of_a_pair_counts(pairs: tuple[Motion, ...]) ->
         assert row.peak_over_alpha == pytest.approx(largest, rel=1e-6)
         assert row.motion in (first.name, second.name)
     assert outcomes.overturned.tolist() == expected and 0 < sum(expected) < len(expected)
-    assert (curve.exceeded.sum(), curve.trials.sum()) == (sum(expected), len(expected))
+    assert (curve.exceedance_counts.sum(), curve.trial_counts.sum()) == (sum(expected), len(expected))
     assert result.description.endswith("the larger response") and curve.cluster_count == 3
     shuffled = fragility(BLOCK, [pairs[k] for k in (0, 2, 5, 1, 4, 3)], measure=ROTATED, levels=LEVELS, larger=True)
-    assert shuffled.curves[0].exceeded.sum() == curve.exceeded.sum()
+    assert shuffled.curves[0].exceedance_counts.sum() == curve.exceedance_counts.sum()
 
 
 def test_a_fragility_meets_the_hazard_curve_in_its_own_component(pairs: tuple[Motion, ...], tmp_path: Path) -> None:
@@ -211,10 +211,12 @@ def test_an_incremental_analysis_finds_the_same_motion_by_every_measure(name: An
 
 
 def test_the_comparison_of_measures_takes_further_ones(pairs: tuple[Motion, ...]) -> None:
-    result = rocking.compare_measures(BLOCK, pairs, periods=[1.0], also=["arias", "cav"], component="rotd50")
+    result = rocking.compare_measures(
+        BLOCK, pairs, periods=[1.0], further_measures=["arias", "cav"], component="rotd50"
+    )
     names = [str(name) for name in result.data.measure.values]
     assert "Arias intensity, RotD50" in names and "CAV, RotD50" in names
-    alone = rocking.compare_measures(BLOCK, pairs, periods=[1.0], also=["arias"])
+    alone = rocking.compare_measures(BLOCK, pairs, periods=[1.0], further_measures=["arias"])
     row = alone.data.intensity.sel(measure="Arias intensity").values[:, 0]
     pga = alone.data.intensity.sel(measure="PGA").values[:, 0]
     known = [Measure("arias").value(motion.scaled_to(level)) for motion, level in zip(pairs, pga, strict=True)]

@@ -58,8 +58,8 @@ RESULTS = {
     "map": lambda path: rocking.dynamics.stroboscopic_map(BLOCK, MOTIONS[0]),
     "solid": lambda path: SOLID,
     "rose": lambda path: SOLID.rose(),
-    "fragility": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10),
-    "risk": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0], [1, 4, 7], trials=10).annual_rate(SITE),
+    "fragility": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trial_counts=10),
+    "risk": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0], [1, 4, 7], trial_counts=10).annual_rate(SITE),
     "survey": lambda path: survey(BLOCK, {"one": RECORD, "two": -RECORD}),
     "rule": lambda path: rocking.rules.west([BLOCK, rocking.Block(half_width=0.2, half_height=1.0)], RECORD),
     "check": lambda path: rocking.rules.compare_rules(BLOCK, {"one": RECORD}, rules=["west"]),
@@ -138,7 +138,7 @@ def test_a_result_can_be_kept_in_a_file_and_sent_to_another_process(result, tabl
 
 def test_a_number_is_answered_with_a_number():
     response = rocking.simulate(BLOCK, RECORD)
-    fitted = rocking.fit_fragility([2.0, 3.0, 4.0], [1, 4, 7], trials=10).curves[0]
+    fitted = rocking.fit_fragility([2.0, 3.0, 4.0], [1, 4, 7], trial_counts=10).curves[0]
     asked = [getattr(response, name) for name in ("rotation", "angular_velocity", "normal_force", "friction_demand")]
     asked += [
         fitted.probability,

@@ -47,7 +47,7 @@ def test_fragility_in_both_polarities_is_that_of_simulations_one_by_one(body):
             unlike += abs(peaks[0] - peaks[1]) > 1e-6
     assert judged == 24
     assert unlike > 4
-    assert found.curve("overturning").trials.sum() == 24  # no polarity is left out
+    assert found.curve("overturning").trial_counts.sum() == 24  # no polarity is left out
     assert found.block is body
 
 

@@ -39,8 +39,8 @@ def test_a_fragility_leaves_out_what_was_given_up_and_reports_it():
     count = int(missing.sum())
     assert 0 < count < len(found.outcomes)
     assert found.outcomes.peak_over_alpha[missing].isna().all()
-    assert found.curves[0].trials.sum() == len(found.outcomes) - count
-    assert found.curves[0].exceeded.sum() == found.outcomes.overturned.sum()
+    assert found.curves[0].trial_counts.sum() == len(found.outcomes) - count
+    assert found.curves[0].exceedance_counts.sum() == found.outcomes.overturned.sum()
     assert f"{count} simulations given up after too many steps: outcomes missing" in found.summary()
     known = found.outcomes[~missing]
     again = rocking.fit_fragility(known.pga_m_s2, known.overturned, clusters=known.motion)
@@ -226,7 +226,7 @@ def test_a_result_draws_itself_into_axes_of_the_caller(results):
 
 @pytest.mark.parametrize("every", [4, pytest.param(1, marks=pytest.mark.thorough)])
 def test_whatever_draws_itself_does_so_at_the_size_that_is_wanted(results, every):
-    fragility = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4)
+    fragility = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trial_counts=4)
     for found in [fragility, rocking.simulate(BLOCK, PULSE), PULSE, *[*results.values()][::every]]:
         assert found.plot(figsize=(3.4, 2.7)).get_size_inches().tolist() == [3.4, 2.7]
 
@@ -320,7 +320,7 @@ def test_a_fragility_keeps_every_simulation_for_an_audit(tmp_path):
     found.to_csv(tmp_path / "outcomes.csv", "outcomes")
     header = (tmp_path / "outcomes.csv").read_text().splitlines()[0]
     assert header.startswith("motion,block,polarity,pga_m_s2,peak_rotation_rad,peak_over_alpha,overturned")
-    given = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4)
+    given = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trial_counts=4)
     with pytest.raises(errors.OptionError, match="no simulations"):
         given.to_csv(tmp_path / "none.csv", "outcomes")
 

@@ -17,7 +17,12 @@ from hypothesis import strategies as st
 
 import rocking
 from rocking import HazardCurve
-from rocking.analysis.hazard import compute_log_parts, compute_log_rate_within, compute_log_survival, compute_power_laws
+from rocking.analysis.hazard import (
+    compute_log_integrals,
+    compute_log_rate_within,
+    compute_log_survival,
+    compute_power_laws,
+)
 from rocking.analysis.probit import Probit
 from rocking.analysis.risk import compute_mean_survival
 from rocking.calibration.tables import read_observed
@@ -34,7 +39,7 @@ def fragility_with(median: float, dispersion: float) -> rocking.Fragility:
     levels = median * np.exp(dispersion * np.linspace(-2.5, 2.5, 41))
     trials = 100_000
     chance = [0.5 * math.erfc(-math.log(x / median) / dispersion / math.sqrt(2.0)) for x in levels]
-    return rocking.fit_fragility(levels, np.round(np.multiply(chance, trials)).astype(int), trials=trials)
+    return rocking.fit_fragility(levels, np.round(np.multiply(chance, trials)).astype(int), trial_counts=trials)
 
 
 def by_quadrature(curve: object, hazard: HazardCurve) -> float:
@@ -101,7 +106,7 @@ def test_against_any_hazard_curve_the_rate_is_the_integral(median: float, beta: 
 def flat_fragility(dispersion: float) -> rocking.Fragility:
     """Two stripes, which are fitted exactly: as wide as wanted."""
     apart = math.exp(2.0 * dispersion * float(mpmath.sqrt(2) * mpmath.erfinv(0.5)))
-    return rocking.fit_fragility([1.0, apart], [25, 75], trials=100)
+    return rocking.fit_fragility([1.0, apart], [25, 75], trial_counts=100)
 
 
 @pytest.mark.parametrize("exponent, dispersion", [(12.0, 1.1), (8.0, 2.0), (20.0, 1.5), (30.0, 3.0), (3.0, 40.0)])
@@ -131,7 +136,7 @@ def test_a_steep_fragility_is_exceeded_as_often_as_its_median() -> None:
 def test_the_interval_is_that_of_the_fragility() -> None:
     hazard = HazardCurve([0.5, 20.0], [1e-1, 1e-4])
     few, many = (
-        rocking.fit_fragility([1.0, 2.0, 3.0, 4.0], [1 * n, 3 * n, 6 * n, 9 * n], trials=10 * n)
+        rocking.fit_fragility([1.0, 2.0, 3.0, 4.0], [1 * n, 3 * n, 6 * n, 9 * n], trial_counts=10 * n)
         .annual_rate(hazard)
         .rates[0]
         for n in (10, 1000)
@@ -144,7 +149,7 @@ def test_the_interval_is_that_of_the_fragility() -> None:
 def test_limits_of_fits_have_the_rates_of_what_they_stand_for() -> None:
     hazard = HazardCurve([0.5, 5.0], [1e-2, 1e-4])
     fits = Probit(np.array([-np.inf, 0.0, -1e9, 2.0]), np.array([0.0, 0.0, 1e9, 1.0]))
-    rates = np.exp(np.logaddexp.reduce(compute_log_parts(fits, hazard), axis=1))
+    rates = np.exp(np.logaddexp.reduce(compute_log_integrals(fits, hazard), axis=1))
     # None ever, half of the weakest motions, all from e m/s^2 on, a lognormal of median exp(-2) and dispersion 1.
     assert rates[:3] == pytest.approx([0.0, math.inf, 1e-2 * (math.e / 0.5) ** -2.0])
     assert rates[3] == pytest.approx(1e-2 * (math.exp(-2.0) / 0.5) ** -2.0 * math.exp(2.0))
@@ -479,7 +484,7 @@ def test_counts_groups_and_motions_are_taken(tmp_path: Path) -> None:
     path = tmp_path / "seen.csv"
     path.write_text("pgv_cm_s,overturned,trials,group\n10,1,10,a\n20,4,10,b\n40,8,10,c\n")
     found = rocking.fit_fragility(**read_observed(path, Measure("pga")))
-    assert (found.measure, found.curves[0].trials.tolist()) == (Measure("pgv"), [10.0, 10.0, 10.0])
+    assert (found.measure, found.curves[0].trial_counts.tolist()) == (Measure("pgv"), [10.0, 10.0, 10.0])
     assert found.intensity_range == pytest.approx((0.1, 0.4))
     assert not found.curves[0].is_independent
     path.write_text(
@@ -511,7 +516,7 @@ def test_counted_outcomes_under_motions_are_those_at_their_intensities(tmp_path:
     pulses = [(f"one-sine:amplitude={x}g,frequency=1Hz", fell, of) for x, fell, of in rows]
     path.write_text("Motion,overturned,trials\n" + "".join(f'"{pulse}",{fell},{of}\n' for pulse, fell, of in pulses))
     under_motions = read_observed(path, Measure("pga"))
-    for name in ("intensity", "exceeded", "trials"):
+    for name in ("intensity", "exceedance_counts", "trial_counts"):
         assert [*under_motions[name]] == pytest.approx([*at_intensities[name]], rel=1e-9)
     assert under_motions["description"] == "33 observed outcomes in seen.csv"
 
@@ -582,7 +587,7 @@ def _rate_within(fitted, hazard):
 )
 def test_the_largest_probability_of_standing_has_the_least_rate_within_the_curve(levels, fell, trials, hazard, years):
     curve = HazardCurve(*hazard)
-    fitted = rocking.fit_fragility(levels, fell, trials=trials)
+    fitted = rocking.fit_fragility(levels, fell, trial_counts=trials)
     found = fitted.survival(years, curve)
     boundary = fitted.curves[0].region
     rates = [_rate_within(each, curve) for each in zip(boundary.intercept, boundary.slope, strict=True)]

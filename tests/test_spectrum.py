@@ -96,7 +96,7 @@ def test_a_fractile_is_infinite_where_the_value_at_it_or_next_above_is(finite, i
 
 def test_the_figure_draws_fractiles_and_leaves_out_what_overturns(spectrum):
     few = spectrum.select(restitution=0.9)
-    figure = few.plot(against="size")
+    figure = few.plot(abscissa="size")
     peaks, shares = figure.axes
     thick = [line for line in peaks.lines if line.get_linewidth() > 1.5 and len(line.get_xdata())]
     assert len(thick) == 2
@@ -134,7 +134,7 @@ def test_a_figure_shows_any_number_of_curves_and_names_some_of_many(spectrum):
         assert len(named) == min(count, 8)
         assert named[0].startswith("alpha = 0.1 ") and named[-1].startswith("alpha = 0.3 ")
     with pytest.raises(rocking.errors.OptionError, match="against"):
-        spectrum.plot(against="height")
+        spectrum.plot(abscissa="height")
 
 
 @given(

@@ -160,7 +160,7 @@ def test_a_killed_study_loses_no_batch_and_goes_on_to_the_same_bytes(complete, t
     seen = kill_again_and_again(tmp_path, times, np.random.default_rng(0), least=1)
     study = made(tmp_path)
     report = study.run()
-    assert not report.failed
+    assert not report.failures
     assert seen and report.batch_count == len(store_of(study).grid) - len(seen)
     assert digest(tmp_path) == digest(complete)
     assert not list(tmp_path.rglob(".*.part*"))
@@ -277,9 +277,9 @@ def test_units_that_failed_are_computed_by_the_next_run(complete, tmp_path, monk
         patched.setattr(RUNS, "compute_batch", broken)
         with rocking.set_options(threads=1):
             report = study.run()
-    assert set(report.failed.values()) == {"ArithmeticError: no luck"}
-    assert len(report.failed) == 36 and study.status.done_count == 0
-    assert not study.run().failed
+    assert set(report.failures.values()) == {"ArithmeticError: no luck"}
+    assert len(report.failures) == 36 and study.status.done_count == 0
+    assert not study.run().failures
     assert digest(tmp_path) == digest(complete)
 
 
@@ -361,7 +361,7 @@ def test_a_damaged_batch_is_named_and_computed_again_on_request(complete, tmp_pa
     (fault,) = study.verify()
     assert "batch.1.1.0.2" in fault
     study.verify(repair=True)
-    assert study.verify(recompute=3) == []
+    assert study.verify(recompute_count=3) == []
     assert path.read_bytes() == sound
 
 
@@ -379,10 +379,10 @@ def test_a_batch_that_is_another_s_is_found_by_computing_it_again(small_complete
     shutil.copytree(small_complete, tmp_path, dirs_exist_ok=True)
     study = rocking.Study(tmp_path)
     names = [format_key(key) for key in store_of(study).grid]
-    assert study.verify(recompute=len(names)) == []
+    assert study.verify(recompute_count=len(names)) == []
     (tmp_path / "batches" / names[0]).write_bytes((tmp_path / "batches" / names[1]).read_bytes())
     assert study.verify() == []
-    assert any(names[0] in fault for fault in study.verify(recompute=len(names)))
+    assert any(names[0] in fault for fault in study.verify(recompute_count=len(names)))
 
 
 def test_damage_to_what_describes_a_study_is_seen(tmp_path):
@@ -453,7 +453,7 @@ def test_another_version_may_read_a_study_but_not_go_on_with_it(tmp_path, monkey
     study = made(tmp_path)
     monkeypatch.setattr("rocking.studies.folder.identify_program", lambda: "rocking 9.9.9 (kernels 0)")
     assert rocking.Study(tmp_path).results().sizes["block"] == 1300
-    for compute in (study.run, lambda: study.verify(recompute=1), lambda: study.verify(repair=True)):
+    for compute in (study.run, lambda: study.verify(recompute_count=1), lambda: study.verify(repair=True)):
         with pytest.raises(errors.StudyError, match=r"9\.9\.9"):
             compute()
     assert study.verify() == []
@@ -590,9 +590,9 @@ def test_a_symmetric_block_counts_once_beside_others(tmp_path):
     (alone, curve), (beside, curves) = made("alone", [even]), made("beside", [odd, even])
     assert np.array_equal(alone.fractile_over_alpha[..., 0], beside.fractile_over_alpha[..., 1])
     assert np.array_equal(alone.overturned_share[..., 0], beside.overturned_share[..., 1])
-    for name in ("median", "dispersion", "median_lower", "exceeded"):
+    for name in ("median", "dispersion", "median_lower", "exceedance_count"):
         assert np.array_equal(curve[name][0, 0], curves[name][0, 1], equal_nan=True)
-    assert int(curves.exceeded[0, 0]) > int(curves.exceeded[0, 1])
+    assert int(curves.exceedance_count[0, 0]) > int(curves.exceedance_count[0, 1])
 
 
 def test_sums_of_weights_in_another_order_make_no_outcome(tmp_path):

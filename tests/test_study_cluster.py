@@ -99,7 +99,7 @@ def test_a_client_is_run_as_its_executor_is(tmp_path):
         }.items():
             study = rocking.create_study(tmp_path / name, BLOCKS, pulse, levels=[0.5, 1.0], blocks_per_batch=1024)
             report = study.run(executor=executor)
-            assert (report.batch_count, report.failed) == (4, {})
+            assert (report.batch_count, report.failures) == (4, {})
     assert digest(tmp_path / "client") == digest(tmp_path / "its executor") == digest(tmp_path / "threads")
 
 
@@ -115,7 +115,7 @@ def test_a_cluster_loses_a_worker_a_batch_and_its_scheduler_but_no_result(comple
         with monkeypatch.context() as patched:
             after_each_unit(patched, cluster.workers[0].kill)
             report = study.run(executor=client)
-        assert (report.batch_count, report.failed) == (BATCHES, {})
+        assert (report.batch_count, report.failures) == (BATCHES, {})
         assert len(client.nthreads()) == 1
     assert digest(tmp_path / "worker") == complete
 
@@ -135,8 +135,8 @@ def test_a_cluster_loses_a_worker_a_batch_and_its_scheduler_but_no_result(comple
         monkeypatch.setattr(RUNS, "compute_batch", deadly)
         report = study.run(executor=client)
         monkeypatch.undo()
-    assert "KilledWorker" in report.failed["batch.0.7.0.0"]
-    assert len(report.failed) <= 2  # with the one that waited behind it
+    assert "KilledWorker" in report.failures["batch.0.7.0.0"]
+    assert len(report.failures) <= 2  # with the one that waited behind it
     with rocking.set_options(threads=1):
         study.run()
     assert digest(tmp_path / "batch") == complete

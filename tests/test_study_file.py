@@ -386,7 +386,7 @@ def test_the_fragility_of_a_study_of_walls_is_that_of_the_function(walls, run, t
     assert study.fragility().curves[0].dispersion == pytest.approx(truth.dispersion, rel=1e-9)
     written = json.loads((tmp_path / "report" / "result.json").read_text())["fragility"]["curves"][0]
     assert written["median"] == pytest.approx(truth.median, rel=1e-9)
-    assert 0 < written["exceeded"] < written["outcomes"] == 8 * 2 * 2 * 4
+    assert 0 < written["exceedance_count"] < written["trial_count"] == 8 * 2 * 2 * 4
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,7 @@ def test_the_curve_of_each_block_is_that_of_its_simulations(curves, blocks):
             [curve.median, curve.dispersion], rel=1e-12
         )
         assert ends == pytest.approx([*curve.median_interval, *curve.dispersion_interval])
-        assert float(one.exceeded) == curve.exceeded.sum()
+        assert float(one.exceedance_count) == curve.exceedance_counts.sum()
     assert fitted >= len(blocks)
 
 
@@ -98,7 +98,7 @@ def test_one_curve_for_all_blocks_is_fitted_to_all_their_simulations(study, simu
     assert found.median == pytest.approx(reference.median, rel=1e-9)
     assert found.dispersion == pytest.approx(reference.dispersion, rel=1e-9)
     assert found.median_interval == pytest.approx(reference.median_interval, rel=1e-6)
-    assert found.trials.sum() == reference.trials.sum()
+    assert found.trial_counts.sum() == reference.trial_counts.sum()
 
 
 def test_blocks_of_one_curve_count_by_their_weights(study):
@@ -112,7 +112,7 @@ def test_blocks_of_one_curve_count_by_their_weights(study):
     assert "weighted" in found.description
     first = np.eye(len(BLOCKS))[0]
     alone, reference = study.fragility(weights=first).curves[0], rocking.fragility(BLOCKS[0], MOTIONS, levels=LEVELS)
-    assert alone.trials.sum() == reference.curves[0].trials.sum() == len(MOTIONS) * len(LEVELS)
+    assert alone.trial_counts.sum() == reference.curves[0].trial_counts.sum() == len(MOTIONS) * len(LEVELS)
 
 
 LIFT = rocking.pulses.one_sine(6.0, 3.0)
@@ -165,7 +165,7 @@ def test_what_is_written_of_spectral_accelerations_says_their_period_and_damping
 
 def test_what_is_read_in_small_parts_is_the_same(study, curves, monkeypatch):
     whole = curves, study.spectrum(), study.fragility(measure="pga_ratio")
-    monkeypatch.setattr(reading, "_MAX_IN_MEMORY", 5 * len(MOTIONS) * len(LEVELS))
+    monkeypatch.setattr(reading, "_MAX_VALUES_IN_MEMORY", 5 * len(MOTIONS) * len(LEVELS))
     parts = study.block_fragilities(limit_states=LIMITS), study.spectrum(), study.fragility(measure="pga_ratio")
     assert whole[0].data.identical(parts[0].data)
     assert whole[1].data.identical(parts[1].data)
@@ -192,8 +192,8 @@ def test_both_polarities_of_asymmetric_blocks_are_two_trials(tmp_path):
     at_once = rocking.fragility(blocks, motions, levels=LEVELS, polarity="both", limit_states=LIMITS)
     for name in LIMITS:
         found, reference = of_study.curve(name), at_once.curve(name)
-        assert found.trials.sum() == reference.trials.sum() == 2 * 3 * len(motions) * len(LEVELS)
-        assert found.exceeded.sum() == reference.exceeded.sum()
+        assert found.trial_counts.sum() == reference.trial_counts.sum() == 2 * 3 * len(motions) * len(LEVELS)
+        assert found.exceedance_counts.sum() == reference.exceedance_counts.sum()
         assert (found.median, found.dispersion) == pytest.approx((reference.median, reference.dispersion), rel=1e-9)
 
 

@@ -48,7 +48,7 @@ class FragilityCurve:
         Name of the limit state.
     limit : float or None
         Limit of the ratio of peak rotation to slenderness, infinite for overturning, or None for given outcomes.
-    intensity, exceeded, trials : ndarray, shape (n,)
+    intensity, exceedance_counts, trial_counts : ndarray, shape (n,)
         Data: number of outcomes that exceeded, and of trials, at each intensity. Weights of blocks lead to fractional
         numbers.
     cluster_count : int
@@ -80,7 +80,7 @@ class FragilityCurve:
     Examples
     --------
     >>> from rocking import fit_fragility
-    >>> curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curves[0]
+    >>> curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trial_counts=4).curves[0]
     >>> low, high = curve.band(curve.median)
     >>> bool(low < 0.5 < high)
     True
@@ -89,8 +89,8 @@ class FragilityCurve:
     limit_state: str
     limit: float | None
     intensity: Floats
-    exceeded: Floats
-    trials: Floats
+    exceedance_counts: Floats
+    trial_counts: Floats
     fitted: Probit
     covariance: Floats
     confidence: float
@@ -102,7 +102,7 @@ class FragilityCurve:
 
     def __repr__(self) -> str:
         median_bounds, dispersion_text = format_median_interval(self, 1.0), format_interval(self.dispersion_interval, 4)
-        count_text = f"{self.exceeded.sum():.0f} of {self.trials.sum():.0f} exceeded"
+        count_text = f"{self.exceedance_counts.sum():.0f} of {self.trial_counts.sum():.0f} exceeded"
         return (
             f"<FragilityCurve: {self.limit_state}, {count_text}; "
             f"median {self.median:.4g} ({median_bounds}) in SI units, "
@@ -185,8 +185,8 @@ class FragilityCurve:
             "dispersion": self.dispersion,
             "dispersion_interval": list(self.dispersion_interval),
             "confidence": self.confidence,
-            "outcomes": round(float(self.trials.sum())),
-            "exceeded": round(float(self.exceeded.sum())),
+            "trial_count": round(float(self.trial_counts.sum())),
+            "exceedance_count": round(float(self.exceedance_counts.sum())),
             "cluster_count": self.cluster_count,
             "log_likelihood": self.log_likelihood,
             "goodness_statistic": self.goodness.statistic,
@@ -204,37 +204,37 @@ def fit_curve(
     limit: float | None = None,
 ) -> FragilityCurve:
     """Fit the curve of a limit state. Without clusters all trials are independent."""
-    intensity, exceeded, trials = data
+    intensity, exceedances, trial_counts = data
     intensity = probit.merge_equal_intensities(intensity)
     # Both are sums of the same weights, but perhaps in a different order.
-    exceeded = np.where(np.abs(trials - exceeded) <= 1e-12 * trials, trials, exceeded)
-    z = np.log(intensity)
-    outcomes = ExceedanceCounts(z, exceeded, trials)
+    exceedances = np.where(np.abs(trial_counts - exceedances) <= 1e-12 * trial_counts, trial_counts, exceedances)
+    log_x = np.log(intensity)
+    outcomes = ExceedanceCounts(log_x, exceedances, trial_counts)
     if message := probit.explain_missing_fit(outcomes, measure.format_value):
         raise FitError(f"no lognormal can be fitted to {name!r}: {message}")
     fitted = probit.fit(outcomes.as_batch())
     log_median = float(-fitted.intercept[0] / fitted.slope[0])
-    if not z.min() - math.log(_MAX_MEDIAN_RATIO) <= log_median <= z.max() + math.log(_MAX_MEDIAN_RATIO):
+    if not log_x.min() - math.log(_MAX_MEDIAN_RATIO) <= log_median <= log_x.max() + math.log(_MAX_MEDIAN_RATIO):
         raise FitError(
             f"no lognormal can be fitted to {name!r}: the outcomes hardly depend on the intensity, so that the median "
-            f"is {'above' if log_median > z.max() else 'below'} all intensities by a factor of more than 1000; use "
+            f"is {'above' if log_median > log_x.max() else 'below'} all intensities by a factor of more than 1000; use "
             "motions nearer to it, or another measure"
         )
-    cluster_count = round(float(trials.sum())) if clusters is None else int(clusters.max()) + 1
-    is_independent = clusters is None or (cluster_count == z.size and bool(np.all(trials <= 1.0)))
+    cluster_count = round(float(trial_counts.sum())) if clusters is None else int(clusters.max()) + 1
+    is_independent = clusters is None or (cluster_count == log_x.size and bool(np.all(trial_counts <= 1.0)))
     return FragilityCurve(
         limit_state=name,
         limit=limit,
         intensity=intensity,
-        exceeded=exceeded,
-        trials=trials,
+        exceedance_counts=exceedances,
+        trial_counts=trial_counts,
         fitted=fitted,
         covariance=probit.compute_covariance(outcomes, fitted),
         confidence=confidence,
         cluster_count=cluster_count,
         is_independent=is_independent,
         log_likelihood=float(probit.compute_log_likelihood(outcomes.as_batch(), np.column_stack(fitted))[0]),
-        goodness=probit.compute_goodness(outcomes, fitted, independent=is_independent),
+        goodness=probit.compute_goodness(outcomes, fitted, is_independent=is_independent),
         region=probit.compute_confidence_region(outcomes, fitted, None if is_independent else clusters, confidence),
     )
 
@@ -243,9 +243,9 @@ def create_fragility_line(curve: FragilityCurve, intensity: Floats, measure: Mea
     """Create the line of a figure: curve, band, and observed shares in the groups of the test."""
     from rocking.plot.curves import FragilityLine
 
-    groups = probit.group_outcomes(np.log(curve.intensity), curve.trials)
-    counts = np.bincount(groups, curve.trials).astype(np.float64)
-    products = curve.trials * curve.intensity, curve.exceeded
+    groups = probit.group_outcomes(np.log(curve.intensity), curve.trial_counts)
+    counts = np.bincount(groups, curve.trial_counts).astype(np.float64)
+    products = curve.trial_counts * curve.intensity, curve.exceedance_counts
     mean_intensity, observed = (np.bincount(groups, product) / counts for product in products)
     is_rotation = curve.limit is not None and math.isfinite(curve.limit)
     limit_text = f" (rotation of {curve.limit:g} of the slenderness)" if is_rotation else ""
@@ -256,13 +256,13 @@ def create_fragility_line(curve: FragilityCurve, intensity: Floats, measure: Mea
     return FragilityLine(label, factor * intensity, probability, *band, factor * mean_intensity, observed)
 
 
-def check_counts(values: ArrayLike, argument: str, size: int, minimum: float, maximum: ArrayLike) -> Floats:
+def check_counts(values: ArrayLike, argument: str, count: int, minimum: float, maximum: ArrayLike) -> Floats:
     """Check integers between two bounds, and return one for each intensity."""
     array = checks.booleans_or_numbers(values, argument, OptionError)
     try:
-        numbers = np.broadcast_to(array, size)
+        numbers = np.broadcast_to(array, count)
     except ValueError:
-        raise OptionError(f"{{}} must contain one number for each of the {size} intensities", argument) from None
+        raise OptionError(f"{{}} must contain one number for each of the {count} intensities", argument) from None
     if not np.all((numbers >= minimum) & (numbers <= np.asarray(maximum)) & (numbers == np.floor(numbers))):
         maximum_text = f"{maximum:g}" if isinstance(maximum, float) else "the number of trials"
         raise OptionError(f"{{}} must be whole numbers from {minimum:g} to {maximum_text}", argument)

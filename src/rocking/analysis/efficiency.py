@@ -44,7 +44,7 @@ def compare_measures(
     *,
     periods: ArrayLike = (0.5, 1.0, 2.0),
     damping: float = 0.05,
-    also: Sequence[IntensityName | Measure] = (),
+    further_measures: Sequence[IntensityName | Measure] = (),
     component: ComponentName = "own",
     model: Model = "nonlinear",
     weights: ArrayLike | None = None,
@@ -61,10 +61,10 @@ def compare_measures(
         Periods of spectral accelerations, s.
     damping : float
         Fraction of critical damping of the spectral accelerations.
-    also : sequence of str or Measure
+    further_measures : sequence of str or Measure
         Further measures, for example ``["arias", "cav"]``.
     component : str
-        Component of all measures but those in `also` that state another, as for `Measure`.
+        Component of all measures but those in `further_measures` that state another, as for `Measure`.
     model : {"nonlinear", "linear"}
         Equation of motion.
     weights, clusters : optional
@@ -116,16 +116,16 @@ def compare_measures(
         raise OptionError("{} must contain at least two motions for a comparison of measures; got one", "motions")
     period_values = checks.positive_numbers(periods, "periods", OptionError)
     spectral_measures = [Measure("sa", float(time), damping) for time in period_values]
-    further = [Measure.parse(name) for name in checks.items(also, "also", OptionError)]
+    parsed_measures = [Measure.parse(name) for name in checks.items(further_measures, "further_measures", OptionError)]
     measures = [
         Measure("pga"),
         Measure("pgv"),
         *spectral_measures,
-        *further,
+        *parsed_measures,
         Measure("pga_ratio"),
         Measure("pgv_ratio"),
     ]
-    measures = [replace(each, component=component) if each.component == "own" else each for each in measures]
+    measures = [replace(item, component=component) if item.component == "own" else item for item in measures]
     cluster_numbers = assign_clusters(motions, clusters)
     _check_sample_size(len(np.unique(cluster_numbers)), clusters)
     analysis = incremental_dynamic_analysis(bodies, motions, measure=measures[-2], model=model, rtol=rtol)
@@ -244,13 +244,13 @@ def _combine_dispersions(
     from scipy.special import chdtri
 
     logarithm = np.where(is_counted, np.log(intensity), np.nan)
-    weight, count = np.where(is_counted, block_weights, 0.0), is_counted.sum(axis=0)
+    weights, motion_counts = np.where(is_counted, block_weights, 0.0), is_counted.sum(axis=0)
     # The sample consists of motions, which are the same for several blocks.
-    total_dof = np.sum(block_weights * (count - 1))
-    deviation = logarithm - np.nansum(logarithm, axis=1, keepdims=True) / np.maximum(count, 1)
-    dispersion = np.sqrt(np.nansum(weight * deviation**2, axis=(1, 2)) / total_dof)
-    mean = np.nansum(weight * logarithm, axis=(1, 2)) / weight.sum()
-    pooled = np.sqrt(np.nansum(weight * (logarithm - mean[:, None, None]) ** 2, axis=(1, 2)) / total_dof)
+    total_dof = np.sum(block_weights * (motion_counts - 1))
+    deviation = logarithm - np.nansum(logarithm, axis=1, keepdims=True) / np.maximum(motion_counts, 1)
+    dispersion = np.sqrt(np.nansum(weights * deviation**2, axis=(1, 2)) / total_dof)
+    mean_log = np.nansum(weights * logarithm, axis=(1, 2)) / weights.sum()
+    pooled = np.sqrt(np.nansum(weights * (logarithm - mean_log[:, None, None]) ** 2, axis=(1, 2)) / total_dof)
     # Ratios of the ends of the interval to the standard deviation, for a normal sample.
     low, high = (float(np.sqrt(dof / chdtri(dof, tail))) * dispersion for tail in (0.05, 0.95))
     spread = "standard deviation of the logarithm of the intensity at overturning"
@@ -258,7 +258,7 @@ def _combine_dispersions(
     return xr.Dataset(
         {
             "intensity": create_variable(("measure", "motion", "block"), intensity, "lowest intensity that overturns"),
-            "median_intensity": create_variable("measure", np.exp(mean), median_text),
+            "median_intensity": create_variable("measure", np.exp(mean_log), median_text),
             "dispersion": create_variable("measure", dispersion, f"{spread} about each block's own mean", "1"),
             "dispersion_low": create_variable("measure", low, "lower end of its interval", "1"),
             "dispersion_high": create_variable("measure", high, "upper end of its interval", "1"),
@@ -268,9 +268,9 @@ def _combine_dispersions(
     )
 
 
-def _check_sample_size(count: int, clusters: object) -> None:
+def _check_sample_size(sample_size: int, clusters: object) -> None:
     """Raise an error for a sample of one cluster, or of one motion without clusters."""
-    if count < 2:
+    if sample_size < 2:
         argument, kind = ("motions", " that are not multiples of one another") if clusters is None else ("clusters", "")
         message = f"fewer than two {{}}{kind} overturn a block at any scale; a dispersion requires at least two"
         raise OptionError(message, argument)

@@ -106,7 +106,7 @@ class Fragility(Result):
     Examples
     --------
     >>> from rocking import HazardCurve, fit_fragility
-    >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4, measure="pga")
+    >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trial_counts=4, measure="pga")
     >>> risk = fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
     >>> f"{risk.rate('overturning').probability(50.0):.4f}"
     '0.0215'
@@ -132,7 +132,7 @@ class Fragility(Result):
         rows = [
             [
                 curve.limit_state,
-                f"{curve.exceeded.sum():.0f} of {curve.trials.sum():.0f}",
+                f"{curve.exceedance_counts.sum():.0f} of {curve.trial_counts.sum():.0f}",
                 scale * curve.median,
                 format_median_interval(curve, scale),
                 curve.dispersion,
@@ -243,8 +243,8 @@ class Fragility(Result):
         """
         curve = self.curve(limit_state)
         rate = None if hazard is None else self.annual_rate(hazard).rate(limit_state)
-        about = (self.measure, self.description, years, confidence, hazard, rate, self.has_several_blocks)
-        survival = Survival(curve, *about)
+        description, has_several_blocks = self.description, self.has_several_blocks
+        survival = Survival(curve, self.measure, description, years, confidence, hazard, rate, has_several_blocks)
         if hazard is None or not self.has_several_blocks or self.outcomes is None:
             return survival
         mean, error = compute_mean_survival(self.outcomes, self.measure.column, limit_state, hazard, survival.years)
@@ -413,7 +413,7 @@ def fragility(
     block_weights = normalise_positive_weights(weights, len(bodies))
     mirrored = checks.choice(polarity, "polarity", OptionError, get_args(Polarity)) == "both" and bodies.is_symmetric
     checks.fraction(confidence, "confidence", OptionError)
-    states = check_limit_states(limit_states)
+    limits = check_limit_states(limit_states)
     stripes = None if levels is None else checks.increasing_numbers(levels, "levels", OptionError)
     if stripes is not None and stripes.size < 2:
         raise OptionError(f"{{}} must contain at least two levels; got {stripes.size}", "levels", value=levels)
@@ -432,26 +432,26 @@ def fragility(
     table = table.transpose("level", "motion", "block", "polarity")
     # The outcome after a loss of contact is unknown.
     has_lost_contact = table.lost_contact.values if "lost_contact" in table else np.zeros_like(table.unfinished.values)
-    missing = table.unfinished.values | has_lost_contact
-    ratio = compute_ratios(slenderness[:, None], table.peak_rotation.values, table.overturned.values, missing)
-    x, trials = (np.broadcast_to(array, ratio.shape).ravel() for array in (intensity, block_weights[:, None]))
+    is_missing = table.unfinished.values | has_lost_contact
+    ratio = compute_ratios(slenderness[:, None], table.peak_rotation.values, table.overturned.values, is_missing)
+    x, trial_weights = (np.broadcast_to(array, ratio.shape).ravel() for array in (intensity, block_weights[:, None]))
     trial_clusters = np.broadcast_to(cluster_numbers[:, None, None], ratio.shape).ravel()
     outcomes = create_outcome_table(
-        bodies, table.assign(unfinished=table.unfinished | missing), measure, x, ratio, states
+        bodies, table.assign(unfinished=table.unfinished | is_missing), measure, x, ratio, limits
     )
     if weights is not None:
-        outcomes["weight"] = trials
-    counted = np.arange(ratio.size)
+        outcomes["weight"] = trial_weights
+    indices = np.arange(ratio.size)
     if checks.boolean(larger, "larger", OptionError):
-        counted = find_larger_responses(ratio, motions, measure).ravel()
-        outcomes = outcomes.iloc[counted].reset_index(drop=True)
+        indices = find_larger_responses(ratio, motions, measure).ravel()
+        outcomes = outcomes.iloc[indices].reset_index(drop=True)
     # Abandoned simulations and blocks of weight 0 are reported, but excluded from the fit.
-    counted = counted[(trials > 0.0)[counted] & ~missing.ravel()[counted]]
-    x, trials, trial_clusters = x[counted], trials[counted], trial_clusters[counted]
+    indices = indices[(trial_weights > 0.0)[indices] & ~is_missing.ravel()[indices]]
+    x, trial_weights, trial_clusters = (x[indices], trial_weights[indices], trial_clusters[indices])
     curves = []
     try:
-        for name, limit in states.items():
-            data = x, trials * compute_exceedances(ratio, limit, name).ravel()[counted], trials
+        for name, limit in limits.items():
+            data = x, trial_weights * compute_exceedances(ratio, limit, name).ravel()[indices], trial_weights
             curves.append(fit_curve(name, data, trial_clusters, confidence, measure, limit))
     except FitError as error:
         error.outcomes = outcomes
@@ -459,9 +459,9 @@ def fragility(
     scales = 1.0 if stripes is None else measure.find_factor(stripes[:, None, None] * units, values[:, None])
     factors = np.asarray(scales)[..., None] * np.array(POLARITY_SIGNS[options["polarity"]])
     setup = Setup(bodies, model, chattering_scheme(chattering), friction=resolve_friction(friction))
-    kind = "cloud" if levels is None else format_count(len(intensity), "stripe")
+    design = "cloud" if levels is None else format_count(len(intensity), "stripe")
     missing_notes = describe_missing(table.unfinished.values), _describe_lost(has_lost_contact)
-    text = f"{describe_pool(blocks, weights)}, {describe_sample(cluster_numbers, clusters)}, {kind}, {model} model"
+    text = f"{describe_pool(blocks, weights)}, {describe_sample(cluster_numbers, clusters)}, {design}, {model} model"
     return Fragility(
         curves=tuple(curves),
         measure=measure,
@@ -489,9 +489,9 @@ def _describe_lost(has_lost_contact: Flags) -> str:
 
 def fit_fragility(
     intensity: ArrayLike,
-    exceeded: ArrayLike | Mapping[str, ArrayLike],
+    exceedance_counts: ArrayLike | Mapping[str, ArrayLike],
     *,
-    trials: ArrayLike = 1,
+    trial_counts: ArrayLike = 1,
     clusters: ArrayLike | None = None,
     measure: IntensityName | Measure = "pga",
     confidence: float = 0.9,
@@ -504,10 +504,10 @@ def fit_fragility(
     ----------
     intensity : array_like, shape (n,)
         Positive intensities, in SI units.
-    exceeded : array_like, shape (n,), or mapping of str to array_like
+    exceedance_counts : array_like, shape (n,), or mapping of str to array_like
         Whether the limit (default: "overturning") was exceeded, or in how many trials. A mapping contains several limit
         states.
-    trials : array_like
+    trial_counts : array_like
         Number of trials at each intensity.
     clusters : array_like of labels, shape (n,), optional
         Labels of dependent outcomes (for example of one motion), for the bands. By default, and for labels NaN, None or
@@ -545,7 +545,7 @@ def fit_fragility(
 
     Examples
     --------
-    >>> curve = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10).curves[0]
+    >>> curve = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trial_counts=10).curves[0]
     >>> print(f"median {curve.median:.4f} m/s^2, dispersion {curve.dispersion:.4f}")
     median 3.1509 m/s^2, dispersion 0.3042
     """
@@ -553,12 +553,12 @@ def fit_fragility(
     x = checks.positive_numbers(intensity, "intensity", OptionError)
     for end in (x.min(), x.max()):
         checks.between(float(end), "intensity", OptionError, 1e-50, 1e50)
-    counts = check_counts(trials, "trials", x.size, 1.0, 2.0**53)
-    outcomes = check_state_mapping(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
+    counts = check_counts(trial_counts, "trial_counts", x.size, 1.0, 2.0**53)
+    by_state = exceedance_counts if isinstance(exceedance_counts, Mapping) else {"overturning": exceedance_counts}
     groups = None if clusters is None else assign_groups(clusters, "clusters", x.size)
     checks.fraction(confidence, "confidence", OptionError)
-    curves = [
-        fit_curve(name, (x, check_counts(values, "exceeded", x.size, 0.0, counts), counts), groups, confidence, measure)
-        for name, values in outcomes.items()
-    ]
+    curves = []
+    for name, values in check_state_mapping(by_state, "exceedance_counts").items():
+        data = x, check_counts(values, "exceedance_counts", x.size, 0.0, counts), counts
+        curves.append(fit_curve(name, data, groups, confidence, measure))
     return Fragility(tuple(curves), measure, description, block, "nonlinear", None, source="cluster")

@@ -306,7 +306,7 @@ def _select_corners(rate: Floats) -> tuple[Integers, Floats]:
     return indices, np.where(is_first, running_minimum, running_minimum * (1.0 - 1e-9))[indices]
 
 
-def compute_log_parts(fits: Probit, hazard: HazardCurve) -> Floats:
+def compute_log_integrals(fits: Probit, hazard: HazardCurve) -> Floats:
     """Compute logarithms of integrals below the hazard curve, over each of its segments, and above.
 
     The shape is (fits, n + 1). On a segment rate(x) = c x^-k, and with P = Phi(z), z = a + b ln x, the part is c exp(k
@@ -316,23 +316,23 @@ def compute_log_parts(fits: Probit, hazard: HazardCurve) -> Floats:
     from scipy.special import erfcx, ndtr
 
     k, log_c = (_repeat_ends(values) for values in compute_power_laws(hazard))
-    corners = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])  # ends of segments
-    ends = corners[:-1], corners[1:]
+    boundaries = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])  # ends of segments
+    ends = boundaries[:-1], boundaries[1:]
     a, b = (values[:, None] for values in fits)
     with np.errstate(all="ignore"):
         shift = k / b
         lower, upper = (a + b * end + shift for end in ends)
         is_mirrored = lower > 0.0
-        near, far = np.where(is_mirrored, lower, -upper), np.where(is_mirrored, upper, -lower)
+        near_bound, far_bound = np.where(is_mirrored, lower, -upper), np.where(is_mirrored, upper, -lower)
         end = np.where(is_mirrored, *ends)
         z = a + b * end
-        near_tail, far_tail = erfcx(near * _SQRT_HALF), erfcx(far * _SQRT_HALF)
-        decay = np.exp(-0.5 * b * (ends[1] - ends[0]) * (near + far)) * far_tail / near_tail
-        tail = log_c - k * end - 0.5 * z * z + np.log(0.5 * near_tail) + np.log1p(-decay)
-        central = log_c + shift * a + 0.5 * shift * shift + np.log(ndtr(upper) - ndtr(lower))
+        near_tail, far_tail = erfcx(near_bound * _SQRT_HALF), erfcx(far_bound * _SQRT_HALF)
+        decay = np.exp(-0.5 * b * (ends[1] - ends[0]) * (near_bound + far_bound)) * far_tail / near_tail
+        tail_logarithm = log_c - k * end - 0.5 * z * z + np.log(0.5 * near_tail) + np.log1p(-decay)
+        central_logarithm = log_c + shift * a + 0.5 * shift * shift + np.log(ndtr(upper) - ndtr(lower))
     # The weakest motions always exceed the limit of a curve that does not rise, unless its probability is 0.
     unbounded = np.where(np.isneginf(a), -np.inf, np.inf)
-    return np.where(b > 0.0, np.where(near > 0.0, tail, central), unbounded)
+    return np.where(b > 0.0, np.where(near_bound > 0.0, tail_logarithm, central_logarithm), unbounded)
 
 
 def compute_log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
@@ -340,10 +340,10 @@ def compute_log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
     from scipy.special import ndtr
 
     a, b = (values[:, None] for values in fits)
-    first, last = ndtr(a + b * np.log(hazard.intensity[[0, -1]])).T
+    first_probability, last_probability = ndtr(a + b * np.log(hazard.intensity[[0, -1]])).T
     # dP is 0 on every segment for a curve that does not rise.
-    inner = np.where(fits.slope > 0.0, np.exp(compute_log_parts(fits, hazard)[:, 1:-1]).sum(axis=1), 0.0)
-    rate = first * hazard.rate[0] - last * hazard.rate[-1] + inner
+    inner_integral = np.where(fits.slope > 0.0, np.exp(compute_log_integrals(fits, hazard)[:, 1:-1]).sum(axis=1), 0.0)
+    rate = first_probability * hazard.rate[0] - last_probability * hazard.rate[-1] + inner_integral
     return np.asarray(np.log(np.maximum(rate, np.finfo(float).tiny)))[:, None]
 
 
@@ -354,14 +354,14 @@ def compute_log_survival(fits: Probit, hazard: HazardCurve, years: float) -> Flo
     a, b = (values[:, None] for values in fits)
     log_x, log_rate = np.log(hazard.intensity), np.log(hazard.rate)
     with np.errstate(all="ignore"):
-        first, last = (np.clip(a + b * end, -38.0, 38.0) for end in log_x[[0, -1]])
-        z = first + (last - first) * np.linspace(0.0, 1.0, 4001)
+        first_score, last_score = (np.clip(a + b * end, -38.0, 38.0) for end in log_x[[0, -1]])
+        z = first_score + (last_score - first_score) * np.linspace(0.0, 1.0, 4001)
         density = -0.5 * z * z - years * np.exp(np.interp((z - a) / b, log_x, log_rate))
         inner = np.logaddexp(density[:, 1:], density[:, :-1]) + np.log(np.diff(z) * math.sqrt(0.125 / math.pi))
         # With a curve that does not rise, the weakest motions overturn every block that overturns.
         inner = np.where(b > 0.0, inner, -np.inf)
-        parts = np.column_stack([log_ndtr(first) - years * hazard.rate[0], inner, log_ndtr(-last)])
-        return np.asarray(np.logaddexp.reduce(parts, axis=1)[:, None])
+        log_terms = np.column_stack([log_ndtr(first_score) - years * hazard.rate[0], inner, log_ndtr(-last_score)])
+        return np.asarray(np.logaddexp.reduce(log_terms, axis=1)[:, None])
 
 
 def _repeat_ends(values: Floats) -> Floats:
@@ -371,7 +371,7 @@ def _repeat_ends(values: Floats) -> Floats:
 
 def compute_log_rate(fits: Probit, hazard: HazardCurve) -> Floats:
     """Compute logarithms of integrals of P(x) |d rate(x)|, with the curve's extrapolations, shape (fits, 1)."""
-    return np.asarray(np.logaddexp.reduce(compute_log_parts(fits, hazard), axis=1)[:, None])
+    return np.asarray(np.logaddexp.reduce(compute_log_integrals(fits, hazard), axis=1)[:, None])
 
 
 def _compute_log_products(fitted: Probit, hazard: HazardCurve, log_intensity: Floats) -> tuple[Floats, Floats]:
@@ -387,12 +387,12 @@ def _compute_log_products(fitted: Probit, hazard: HazardCurve, log_intensity: Fl
 
 def compute_shares_beyond(fitted: Probit, hazard: HazardCurve) -> tuple[float, float]:
     """Compute shares of the integral of P(x) |d rate(x)| below and above the hazard curve, by parts."""
-    parts, total = compute_log_parts(fitted, hazard)[0], compute_log_rate(fitted, hazard)[0, 0]
+    log_integrals, total = compute_log_integrals(fitted, hazard)[0], compute_log_rate(fitted, hazard)[0, 0]
     first, last = _compute_log_products(fitted, hazard, np.log(hazard.intensity[[0, -1]]))[0]
     with np.errstate(all="ignore"):
-        below = np.exp(parts[0] - total) * max(-math.expm1(min(first - parts[0], 0.0)), 0.0)
-        above = np.exp(np.logaddexp(parts[-1], last) - total)
-    return float(below), float(above)
+        share_below = np.exp(log_integrals[0] - total) * max(-math.expm1(min(first - log_integrals[0], 0.0)), 0.0)
+        share_above = np.exp(np.logaddexp(log_integrals[-1], last) - total)
+    return float(share_below), float(share_above)
 
 
 def compute_share_density(fitted: Probit, hazard: HazardCurve, intensity: Floats) -> Floats:

@@ -309,11 +309,11 @@ def _simulate_until_overturned(
         levels = lowest_level * np.power(1.05, np.arange(start, start + _LEVELS_PER_CHUNK, dtype=np.float64))
         tables.append(simulate_levels(blocks, motions, measure, levels, **options))
         overturned = xr.concat([chunk.overturned for chunk in tables], "level")
-        last = 3.0 * overturned.level.where(overturned).min("level", skipna=True).max(skipna=False)
-        if last <= levels[-1]:
+        last_level = 3.0 * overturned.level.where(overturned).min("level", skipna=True).max(skipna=False)
+        if last_level <= levels[-1]:
             break
     table = xr.concat(tables, "level", data_vars="all", coords="minimal", compat="override", join="override")
-    indices = np.flatnonzero(table.level.values >= float(last))
+    indices = np.flatnonzero(table.level.values >= float(last_level))
     return table.isel(level=slice(0, indices[0] + 1 if indices.size else None))
 
 

@@ -198,11 +198,11 @@ def find_larger_responses(ratio: Floats, motions: Sequence[Motion], measure: Mea
     positions = np.arange(ratio.size).reshape(ratio.shape)
     columns = []
     for k in range(pairs.max() + 1):
-        ranks, places = (
+        pair_ranks, pair_positions = (
             np.moveaxis(array[:, pairs == k], 2, 1).reshape(len(ratio), ratio.shape[2], -1)
             for array in (rank, positions)
         )
-        columns.append(np.take_along_axis(places, ranks.argmax(axis=2)[..., None], axis=2)[..., 0])
+        columns.append(np.take_along_axis(pair_positions, pair_ranks.argmax(axis=2)[..., None], axis=2)[..., 0])
     return np.stack(columns, axis=1)
 
 
@@ -220,9 +220,9 @@ def assign_families(motions: Sequence[Motion], *, include_reversed: bool = True)
     for k, motion in enumerate(motions):
         magnitudes = np.abs(np.concatenate([part.coefficients.ravel() for part in (motion, motion.vertical) if part]))
         invariants[k] = (magnitudes / magnitudes.max()).mean(), np.sqrt(((magnitudes / magnitudes.max()) ** 2).mean())
-        near = np.flatnonzero(np.all(np.abs(invariants[first_members] - invariants[k]) <= 1e-9, axis=1)).tolist()
-        is_alike = (is_multiple(motions[first_members[j]], motion, include_reversed=include_reversed) for j in near)
-        families[k] = next(compress(near, is_alike), len(first_members))
+        nearby = np.flatnonzero(np.all(np.abs(invariants[first_members] - invariants[k]) <= 1e-9, axis=1)).tolist()
+        is_alike = (is_multiple(motions[first_members[j]], motion, include_reversed=include_reversed) for j in nearby)
+        families[k] = next(compress(nearby, is_alike), len(first_members))
         if families[k] == len(first_members):
             first_members.append(k)
     return families
@@ -397,7 +397,7 @@ def find_boundaries(
     Changes between two levels of equal outcome are not detected. Few brackets are bisected several times per call of
     `find_outcome`, by all midpoints that may be needed.
     """
-    known: dict[tuple[int, float], int] = {}
+    outcomes_by_point: dict[tuple[int, float], int] = {}
     row, column = np.nonzero(outcome[1:] != outcome[:-1])
     brackets = Brackets(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
     origin = np.arange(len(brackets.level))
@@ -405,14 +405,14 @@ def find_boundaries(
     with Progress("refining", remaining) as bar:
         while (is_wide := bisection.is_wide(brackets.low, brackets.high, rtol)).any():
             wanted = list(zip(brackets.column[is_wide].tolist(), brackets.level[is_wide].tolist(), strict=True))
-            if not known.keys() >= set(wanted):
+            if not outcomes_by_point.keys() >= set(wanted):
                 columns, midpoints = _collect_midpoints(
                     brackets.column[is_wide], brackets.low[is_wide], brackets.high[is_wide]
                 )
                 points = zip(columns.tolist(), midpoints.tolist(), strict=True)
-                known = dict(zip(points, find_outcome(columns, midpoints).tolist(), strict=True))
+                outcomes_by_point = dict(zip(points, find_outcome(columns, midpoints).tolist(), strict=True))
             outcomes = brackets.outcome_below.copy()
-            outcomes[is_wide] = [known[point] for point in wanted]
+            outcomes[is_wide] = [outcomes_by_point[point] for point in wanted]
             brackets, origin = _bisect(brackets, is_wide, outcomes, origin)
             # A third outcome adds brackets, for which the progress bar does not move back.
             previous, remaining = remaining, min(remaining, _count_bisections(brackets, rtol))

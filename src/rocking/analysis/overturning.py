@@ -173,11 +173,11 @@ def overturning_map(
         raise OptionError(message, "restitution")
     min_p = min(side.p for side in block.sides)
     create_pulse, frequency = _create_pulse_function(pulse, parameters), min_p / (2.0 * math.pi)
-    unit = _call_pulse(create_pulse, 1.0, frequency)
+    unit_pulse = _call_pulse(create_pulse, 1.0, frequency)
     for ratio in {float(ratios[0]), float(ratios[-1])}:
         amplitude = 1.0 + ratio
         scaled_pulse = _call_pulse(create_pulse, amplitude, ratio * frequency)
-        pairs = (unit, scaled_pulse), (unit.vertical, scaled_pulse.vertical)
+        pairs = (unit_pulse, scaled_pulse), (unit_pulse.vertical, scaled_pulse.vertical)
         if not all(_is_alike(first, second, amplitude, ratio) for first, second in pairs):
             raise OptionError(
                 "the {} must have the same shape at all frequencies: proportional to the amplitude, and half as long "
@@ -187,7 +187,7 @@ def overturning_map(
     p, alpha, restitution = np.array([(side.p, side.alpha, side.restitution) for side in block.sides]).T
     # Blocks of one shape with values of p that correspond to the ratios for a pulse of the block's frequency.
     blocks = Blocks(p / ratios[:, None], alpha[None, :], restitution[None, :], gravity=block.gravity)
-    coefficients, scheme = resolve_friction(friction), Certified(relative_width * unit.end)
+    coefficients, scheme = resolve_friction(friction), Certified(relative_width * unit_pulse.end)
     blocks.__dict__["radii"] = np.array(block._list_radii()) * ratios[:, None] ** 2
     check_friction(blocks, model, coefficients)
     setup, threshold = Setup(blocks, model, scheme, friction=coefficients), min(block.uplift_thresholds(model))
@@ -197,10 +197,10 @@ def overturning_map(
     ) -> tuple[Integers, Floats]:
         """Simulate the block of each column at its level, and return modes and peak rotations."""
         results = np.empty(column.size, dtype=OUTCOME_DTYPE)
-        for k, outcomes in simulate_each(setup, [unit], column, np.zeros_like(column), threshold * level):
+        for k, outcomes in simulate_each(setup, [unit_pulse], column, np.zeros_like(column), threshold * level):
             results[k] = outcomes
             advance(len(outcomes))
-        modes = np.where(results["unfinished"], OverturningMode.UNFINISHED, classify_modes(results, unit.end))
+        modes = np.where(results["unfinished"], OverturningMode.UNFINISHED, classify_modes(results, unit_pulse.end))
         return modes, results["peak_rotation"]
 
     row, column = (index.ravel() for index in np.indices((levels.size, ratios.size)))
@@ -214,8 +214,8 @@ def overturning_map(
         "block": block.description,
         add_unit("alpha", "rad"): [side.alpha for side in block.sides],
         "restitution": [side.restitution for side in block.sides],
-        "pulse": f"{unit.name}: {unit.description.text}",
-        "pulse_name": unit.name,
+        "pulse": f"{unit_pulse.name}: {unit_pulse.description.text}",
+        "pulse_name": unit_pulse.name,
         "rtol": relative_width,
     }
     return OverturningMap(_combine_modes(levels, ratios, modes, peaks, brackets, attributes))
@@ -311,7 +311,7 @@ class OverturningMap(DatasetResult):
         ]
         rows = [(float(ratio), self._describe_lowest(k)) for k, ratio in enumerate(self.data.frequency)]
         header = ["2 pi f/p", "lowest amplitude that overturns, over the smallest that lifts"]
-        headline = f"{self.data.pulse_name} on a block with {self._proportions}; {self.data.model} model"
+        headline = f"{self.data.pulse_name} on a block with {self._proportion_text}; {self.data.model} model"
         tables = format_table(["outcome", "share of the map"], shares), format_some_rows(header, rows)
         notes = list_missing_notes(self.data.mode.values == OverturningMode.UNFINISHED)
         return "\n\n".join([headline, *tables, *notes])
@@ -353,13 +353,13 @@ class OverturningMap(DatasetResult):
             names={int(mode): mode_name(int(mode)) for mode in np.union1d(modes, data.mode_above.values)},
             x_label="2πf/p, with the frequency f of the pulse",
             y_label="amplitude over the smallest that lifts the block",
-            title=title or escape_dollars(f"{self.data.pulse_name}, {self._proportions}, {data.model} model"),
+            title=title or escape_dollars(f"{self.data.pulse_name}, {self._proportion_text}, {data.model} model"),
             ax=ax,
             figsize=figsize,
         )
 
     @property
-    def _proportions(self) -> str:
+    def _proportion_text(self) -> str:
         """Describe the block's slenderness and restitution, which usually are equal on both sides."""
         sides = self.data.attrs[add_unit("alpha", "rad")], self.data.restitution
         alpha, restitution = (", ".join(dict.fromkeys(f"{value:.5g}" for value in values)) for values in sides)

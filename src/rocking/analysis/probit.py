@@ -39,17 +39,17 @@ MIN_CLUSTERS: Final = 3
 class ExceedanceCounts(NamedTuple):
     """Numbers of exceedances and trials at n logarithms of the intensity, for one or several data sets."""
 
-    z: Floats
-    exceeded: Floats
-    trials: Floats
+    log_x: Floats
+    exceedance_counts: Floats
+    trial_counts: Floats
 
     def as_batch(self) -> ExceedanceCounts:
         """Return one data set with an additional dimension of length 1."""
-        return ExceedanceCounts(self.z, self.exceeded[None, :], self.trials[None, :])
+        return ExceedanceCounts(self.log_x, self.exceedance_counts[None, :], self.trial_counts[None, :])
 
     def select(self, is_selected: Flags) -> ExceedanceCounts:
         """Return selected data sets."""
-        return ExceedanceCounts(self.z, self.exceeded[is_selected], self.trials[is_selected])
+        return ExceedanceCounts(self.log_x, self.exceedance_counts[is_selected], self.trial_counts[is_selected])
 
 
 class Probit(NamedTuple):
@@ -68,7 +68,7 @@ class Probit(NamedTuple):
     Examples
     --------
     >>> from rocking import fit_fragility
-    >>> fitted = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10).curves[0].fitted
+    >>> fitted = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trial_counts=10).curves[0].fitted
     >>> f"intercept {fitted.intercept[0]:.3f}, slope {fitted.slope[0]:.3f}"
     'intercept -3.773, slope 3.287'
     """
@@ -90,18 +90,18 @@ _WHOLE_PLANE: Final = Probit(
 )
 
 
-def compute_normal_scores(fits: Probit, z: Floats) -> Floats:
+def compute_normal_scores(fits: Probit, log_x: Floats) -> Floats:
     """Compute normal scores of the probability at logarithms of the intensity, shape (fits, len(z)), -inf at 0."""
-    finite = np.isfinite(z)
-    scores = fits.intercept[:, None] + fits.slope[:, None] * np.where(finite, z, 0.0)
-    return np.where(finite, scores, z)
+    is_finite = np.isfinite(log_x)
+    scores = fits.intercept[:, None] + fits.slope[:, None] * np.where(is_finite, log_x, 0.0)
+    return np.where(is_finite, scores, log_x)
 
 
-def compute_probabilities(fits: Probit, z: Floats) -> Floats:
+def compute_probabilities(fits: Probit, log_x: Floats) -> Floats:
     """Compute probabilities at logarithms of the intensity, shape (fits, len(z))."""
     from scipy.special import ndtr
 
-    values: Floats = ndtr(compute_normal_scores(fits, z))
+    values: Floats = ndtr(compute_normal_scores(fits, log_x))
     return values
 
 
@@ -127,7 +127,7 @@ class Goodness:
     Examples
     --------
     >>> from rocking import fit_fragility
-    >>> goodness = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10).curves[0].goodness
+    >>> goodness = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trial_counts=10).curves[0].goodness
     >>> f"{goodness.degrees_of_freedom} degrees of freedom, p-value {goodness.p_value:.2f}"
     '2 degrees of freedom, p-value 0.52'
     """
@@ -149,18 +149,19 @@ def merge_equal_intensities(intensity: Floats) -> Floats:
 
 def explain_missing_fit(data: ExceedanceCounts, format_intensity: Callable[[float], str]) -> str | None:
     """Explain why no rising lognormal fits a data set, or return None if one does."""
-    z, exceeded, trials = data
-    exceeded_z, other_z, count = z[exceeded > 0], z[exceeded < trials], round(float(trials.sum()))
-    if not exceeded_z.size or not other_z.size:
-        quantifier, remedy = ("no", "stronger") if not exceeded_z.size else ("every", "weaker")
-        ends = dict.fromkeys(format_intensity(math.exp(end)) for end in (z.min(), z.max()))
+    log_x, exceedances, trial_counts = data
+    exceeding_log_x, other_log_x = log_x[exceedances > 0], log_x[exceedances < trial_counts]
+    count = round(float(trial_counts.sum()))
+    if not exceeding_log_x.size or not other_log_x.size:
+        quantifier, remedy = ("no", "stronger") if not exceeding_log_x.size else ("every", "weaker")
+        ends = dict.fromkeys(format_intensity(math.exp(end)) for end in (log_x.min(), log_x.max()))
         return f"{quantifier} outcome of {count} exceeds the limit, at {' to '.join(ends)}; use {remedy} motions"
-    if z.min() == z.max():
-        return f"all outcomes are at one intensity, {format_intensity(math.exp(z[0]))}; use several intensities"
-    if other_z.max() <= exceeded_z.min() + _compute_overlap(z):
-        low, high = math.exp(other_z.max()), math.exp(exceeded_z.min())
-        start, rest = ("below", "above it") if low >= high else ("up to", f"from {format_intensity(high)} on")
-        gap = f"{start} {format_intensity(low)} and all do {rest}"
+    if log_x.min() == log_x.max():
+        return f"all outcomes are at one intensity, {format_intensity(math.exp(log_x[0]))}; use several intensities"
+    if other_log_x.max() <= exceeding_log_x.min() + _compute_overlap(log_x):
+        low, high = math.exp(other_log_x.max()), math.exp(exceeding_log_x.min())
+        start, others_text = ("below", "above it") if low >= high else ("up to", f"from {format_intensity(high)} on")
+        gap = f"{start} {format_intensity(low)} and all do {others_text}"
         return (
             f"the outcomes are separated, none exceeds the limit {gap}, so that the fragility is a step; use more "
             "motions near it"
@@ -175,22 +176,22 @@ def explain_missing_fit(data: ExceedanceCounts, format_intensity: Callable[[floa
 
 def fit(data: ExceedanceCounts) -> Probit:
     """Fit several data sets that have one (`explain_missing_fit`) by maximum likelihood (Fisher's scoring)."""
-    centre, spread = data.z.mean(), data.z.std()
-    scaled = data._replace(z=(data.z - centre) / spread)
-    beta = np.zeros((len(data.trials), 2))
-    current = compute_log_likelihood(scaled, beta)
-    powers = np.stack([np.ones_like(scaled.z), scaled.z])
-    full_information = np.einsum("fn,jn,kn->fjk", data.trials, powers, powers)
+    centre, spread = data.log_x.mean(), data.log_x.std()
+    scaled = data._replace(log_x=(data.log_x - centre) / spread)
+    beta = np.zeros((len(data.trial_counts), 2))
+    log_likelihoods = compute_log_likelihood(scaled, beta)
+    powers = np.stack([np.ones_like(scaled.log_x), scaled.log_x])
+    full_information = np.einsum("fn,jn,kn->fjk", data.trial_counts, powers, powers)
     for _ in range(_MAX_ITERATIONS):
         with np.errstate(all="ignore"):
-            gradient, information = _differentiate(scaled, beta)
-            step = _solve_pairs(information, gradient)
+            gradient, information = _compute_score_and_information(scaled, beta)
+            step = _solve_two_equations(information, gradient)
         # Far from the maximum the information may vanish by rounding. The step of the complete data (EM) still
         # increases the likelihood.
         is_singular = ~np.isfinite(step).all(axis=1)
-        step[is_singular] = _solve_pairs(full_information[is_singular], gradient[is_singular])
-        step, following = _shorten_steps(scaled, beta, step, current)
-        beta, current = beta + step, following
+        step[is_singular] = _solve_two_equations(full_information[is_singular], gradient[is_singular])
+        step, new_log_likelihoods = _shorten_steps(scaled, beta, step, log_likelihoods)
+        beta, log_likelihoods = beta + step, new_log_likelihoods
         if np.all(np.abs(step) <= 1e-11 * np.abs(beta).max(axis=1, keepdims=True)):
             break
     slope = beta[:, 1] / spread
@@ -201,12 +202,12 @@ def fit_or_limits(data: ExceedanceCounts) -> Probit:
     """Fit several data sets, with the limit of rising curves if their likelihood has no maximum."""
     from scipy.special import ndtri
 
-    z, exceeded, trials = data
-    min_exceeded = np.where(exceeded > 0, z, np.inf).min(axis=1)
-    max_other = np.where(exceeded < trials, z, -np.inf).max(axis=1)
-    is_step = np.isfinite(max_other - min_exceeded) & (max_other <= min_exceeded + _compute_overlap(z))
+    log_x, exceedances, trial_counts = data
+    min_exceeded = np.where(exceedances > 0, log_x, np.inf).min(axis=1)
+    max_other = np.where(exceedances < trial_counts, log_x, -np.inf).max(axis=1)
+    is_step = np.isfinite(max_other - min_exceeded) & (max_other <= min_exceeded + _compute_overlap(log_x))
     # If the best curve would fall, the limit is level: one probability, 0 or 1 if all outcomes are equal.
-    fits = Probit(ndtri(exceeded.sum(axis=1) / trials.sum(axis=1)), np.where(is_step, STEEPEST_SLOPE, 0.0))
+    fits = Probit(ndtri(exceedances.sum(axis=1) / trial_counts.sum(axis=1)), np.where(is_step, STEEPEST_SLOPE, 0.0))
     fits.intercept[is_step] = -0.5 * STEEPEST_SLOPE * (max_other + min_exceeded)[is_step]
     if (is_regular := ~is_step & _is_rising(data)).any():
         fits.intercept[is_regular], fits.slope[is_regular] = fit(data.select(is_regular))
@@ -217,10 +218,10 @@ def compute_log_likelihood(data: ExceedanceCounts, beta: Floats) -> Floats:
     """Compute the log-likelihood of parameters (fits, 2), without binomial coefficients."""
     from scipy.special import log_ndtr
 
-    z, exceeded, trials = data
-    scores = beta[:, :1] + beta[:, 1:] * z
-    terms = np.where(exceeded > 0, exceeded * log_ndtr(scores), 0.0)
-    terms += np.where(exceeded < trials, (trials - exceeded) * log_ndtr(-scores), 0.0)
+    log_x, exceedances, trial_counts = data
+    scores = beta[:, :1] + beta[:, 1:] * log_x
+    terms = np.where(exceedances > 0, exceedances * log_ndtr(scores), 0.0)
+    terms += np.where(exceedances < trial_counts, (trial_counts - exceedances) * log_ndtr(-scores), 0.0)
     total: Floats = terms.sum(axis=1)
     return total
 
@@ -228,64 +229,64 @@ def compute_log_likelihood(data: ExceedanceCounts, beta: Floats) -> Floats:
 def compute_covariance(data: ExceedanceCounts, fitted: Probit) -> Floats:
     """Compute the inverse of Fisher's expected information of intercept and slope for one fit, shape (2, 2)."""
     scaled, scaled_fit, centre, spread = _standardise(data, fitted)
-    information = _differentiate(scaled.as_batch(), np.column_stack(scaled_fit))[1][0]
+    information = _compute_score_and_information(scaled.as_batch(), np.column_stack(scaled_fit))[1][0]
     transform = np.array([[1.0, -centre / spread], [0.0, 1.0 / spread]])
     return np.asarray(transform @ np.linalg.inv(information) @ transform.T, dtype=np.float64)
 
 
 def _standardise(data: ExceedanceCounts, fitted: Probit) -> tuple[ExceedanceCounts, Probit, float, float]:
     """Standardise z in data and fits for accuracy, and return mean and deviation of z as well."""
-    centre, spread = float(data.z.mean()), float(data.z.std())
-    scaled = data._replace(z=(data.z - centre) / spread)
+    centre, spread = float(data.log_x.mean()), float(data.log_x.std())
+    scaled = data._replace(log_x=(data.log_x - centre) / spread)
     return scaled, Probit(fitted.intercept + fitted.slope * centre, fitted.slope * spread), centre, spread
 
 
-def group_outcomes(z: Floats, trials: Floats) -> Integers:
+def group_outcomes(log_x: Floats, trial_counts: Floats) -> Integers:
     """Assign outcomes to groups: by intensity if each has five outcomes or more, else up to ten equal groups."""
-    intensity_index = np.unique(z, return_inverse=True)[1]
-    trial_counts = np.bincount(intensity_index, trials)
-    if trial_counts.min() >= _MIN_GROUP_SIZE:
+    intensity_index = np.unique(log_x, return_inverse=True)[1]
+    counts_by_intensity = np.bincount(intensity_index, trial_counts)
+    if counts_by_intensity.min() >= _MIN_GROUP_SIZE:
         return np.asarray(intensity_index, dtype=np.int64)
-    group_count = min(10, int(trials.sum()) // _MIN_GROUP_SIZE)
-    midpoints = (np.cumsum(trial_counts) - 0.5 * trial_counts) / trial_counts.sum()
+    group_count = min(10, int(trial_counts.sum()) // _MIN_GROUP_SIZE)
+    midpoints = (np.cumsum(counts_by_intensity) - 0.5 * counts_by_intensity) / counts_by_intensity.sum()
     _, group = np.unique((midpoints * group_count).astype(np.int64), return_inverse=True)
     return np.asarray(group[intensity_index], dtype=np.int64)
 
 
-def compute_goodness(data: ExceedanceCounts, fitted: Probit, *, independent: bool) -> Goodness:
+def compute_goodness(data: ExceedanceCounts, fitted: Probit, *, is_independent: bool) -> Goodness:
     """Test the fit by Pearson's statistic of groups of outcomes."""
     from scipy.special import gammaincc
 
-    groups = group_outcomes(data.z, data.trials)
-    probability = compute_probabilities(fitted, data.z)[0]
-    expected = np.bincount(groups, data.trials * probability)
-    variance = np.bincount(groups, data.trials * (probability * (1.0 - probability)))
-    observed = np.bincount(groups, data.exceeded)
+    groups = group_outcomes(data.log_x, data.trial_counts)
+    probability = compute_probabilities(fitted, data.log_x)[0]
+    expected = np.bincount(groups, data.trial_counts * probability)
+    variance = np.bincount(groups, data.trial_counts * (probability * (1.0 - probability)))
+    observed = np.bincount(groups, data.exceedance_counts)
     degrees_of_freedom = len(observed) - 2
     if degrees_of_freedom < 1:
         return Goodness(math.nan, max(degrees_of_freedom, 0), math.nan)
     # If a group's variance vanishes, the fitted probability is 0 or 1, as observed.
     with np.errstate(over="ignore"):
         statistic = float(np.sum((observed - expected) ** 2 / np.maximum(variance, np.finfo(float).tiny)))
-    p_value = float(gammaincc(0.5 * degrees_of_freedom, 0.5 * statistic)) if independent else math.nan
+    p_value = float(gammaincc(0.5 * degrees_of_freedom, 0.5 * statistic)) if is_independent else math.nan
     return Goodness(statistic, degrees_of_freedom, p_value)
 
 
-def _compute_overlap(z: Floats) -> float:
+def _compute_overlap(log_x: Floats) -> float:
     """Compute the largest overlap of both kinds of outcomes that is too narrow to determine a slope."""
-    return 1e-6 * float(z.max() - z.min())
+    return 1e-6 * float(log_x.max() - log_x.min())
 
 
 def _is_rising(data: ExceedanceCounts) -> Flags:
     """Whether the likelihood of each data set increases with the slope of a level curve."""
-    z, exceeded, trials = data
-    centred = z - z.mean()
-    share = exceeded.sum(axis=1, keepdims=True) / trials.sum(axis=1, keepdims=True)
-    score = np.sum((exceeded - trials * share) * centred, axis=1)
-    return np.asarray(score > 1e-12 * np.sum(trials * np.abs(centred), axis=1))
+    log_x, exceedances, trial_counts = data
+    centred = log_x - log_x.mean()
+    share = exceedances.sum(axis=1, keepdims=True) / trial_counts.sum(axis=1, keepdims=True)
+    score = np.sum((exceedances - trial_counts * share) * centred, axis=1)
+    return np.asarray(score > 1e-12 * np.sum(trial_counts * np.abs(centred), axis=1))
 
 
-def _solve_pairs(matrix: Floats, right_side: Floats) -> Floats:
+def _solve_two_equations(matrix: Floats, right_side: Floats) -> Floats:
     """Solve symmetric positive systems of two equations, shapes (fits or 1, 2, 2) and (fits, 2)."""
     a, b, c = matrix[:, 0, 0], matrix[:, 0, 1], matrix[:, 1, 1]
     ratio = b / a
@@ -293,13 +294,13 @@ def _solve_pairs(matrix: Floats, right_side: Floats) -> Floats:
     return np.stack([right_side[:, 0] / a - ratio * second, second], axis=1)
 
 
-def _differentiate(data: ExceedanceCounts, beta: Floats) -> tuple[Floats, Floats]:
+def _compute_score_and_information(data: ExceedanceCounts, beta: Floats) -> tuple[Floats, Floats]:
     """Compute score and Fisher's expected information, shapes (fits, 2) and (fits, 2, 2)."""
-    z, exceeded, trials = data
-    density, log_below, log_above = _compute_log_normals(beta[:, :1] + beta[:, 1:] * z)
-    residual = exceeded * np.exp(density - log_below) - (trials - exceeded) * np.exp(density - log_above)
-    weight = trials * np.exp(2.0 * density - log_below - log_above)
-    powers = np.stack([np.ones_like(z), z])
+    log_x, exceedances, trial_counts = data
+    density, log_below, log_above = _compute_log_normals(beta[:, :1] + beta[:, 1:] * log_x)
+    residual = exceedances * np.exp(density - log_below) - (trial_counts - exceedances) * np.exp(density - log_above)
+    weight = trial_counts * np.exp(2.0 * density - log_below - log_above)
+    powers = np.stack([np.ones_like(log_x), log_x])
     return np.einsum("fn,jn->fj", residual, powers), np.einsum("fn,jn,kn->fjk", weight, powers, powers)
 
 
@@ -310,16 +311,16 @@ def _compute_log_normals(scores: Floats) -> tuple[Floats, Floats, Floats]:
     return -0.5 * scores * scores - 0.5 * math.log(2.0 * math.pi), log_ndtr(scores), log_ndtr(-scores)
 
 
-def _shorten_steps(data: ExceedanceCounts, beta: Floats, step: Floats, current: Floats) -> tuple[Floats, Floats]:
+def _shorten_steps(data: ExceedanceCounts, beta: Floats, step: Floats, likelihoods: Floats) -> tuple[Floats, Floats]:
     """Halve steps until the likelihood does not decrease, and return steps and likelihoods."""
-    following = compute_log_likelihood(data, beta + step)
+    new_likelihoods = compute_log_likelihood(data, beta + step)
     for _ in range(_MAX_ITERATIONS):
-        is_lower = ~(following >= current - 1e-12 * np.abs(current))
+        is_lower = ~(new_likelihoods >= likelihoods - 1e-12 * np.abs(likelihoods))
         if not is_lower.any():
             break
         step[is_lower] *= 0.5
-        following[is_lower] = compute_log_likelihood(data.select(is_lower), (beta + step)[is_lower])
-    return step, following
+        new_likelihoods[is_lower] = compute_log_likelihood(data.select(is_lower), (beta + step)[is_lower])
+    return step, new_likelihoods
 
 
 def compute_confidence_region(
@@ -333,15 +334,16 @@ def compute_confidence_region(
     """
     from scipy.special import chdtri, stdtrit
 
-    scaled, best, centre, spread = _standardise(data, fitted)
+    scaled, best_fit, centre, spread = _standardise(data, fitted)
     if clusters is None:
-        boundary = _trace_region(scaled, best, 0.5 * float(chdtri(1.0, 1.0 - confidence)))
+        boundary = _trace_region(scaled, best_fit, 0.5 * float(chdtri(1.0, 1.0 - confidence)))
     elif (cluster_count := int(clusters.max()) + 1) < MIN_CLUSTERS:
         return _WHOLE_PLANE
     else:
-        maximum, drop = np.column_stack(best), 0.5 * float(stdtrit(cluster_count - 1.0, 0.5 + 0.5 * confidence)) ** 2
-        offsets = _trace_region(scaled, best, drop) - maximum
-        boundary = maximum + offsets @ _compute_stretch(scaled, clusters, best).T
+        maximum = np.column_stack(best_fit)
+        drop = 0.5 * float(stdtrit(cluster_count - 1.0, 0.5 + 0.5 * confidence)) ** 2
+        offsets = _trace_region(scaled, best_fit, drop) - maximum
+        boundary = maximum + offsets @ _compute_stretch_matrix(scaled, clusters, best_fit).T
     intercepts, slopes = _cut_at_zero_slope(boundary).T
     slopes = slopes / spread
     return Probit(intercepts - slopes * centre, slopes)
@@ -349,9 +351,9 @@ def compute_confidence_region(
 
 def _trace_region(data: ExceedanceCounts, best: Probit, drop: float) -> Floats:
     """Trace the points around the maximum at which the log-likelihood is lower by `drop`, shape (rays, 2)."""
-    z, index = np.unique(data.z, return_inverse=True)
-    merged = ExceedanceCounts(z, *(np.bincount(index, counts).astype(np.float64) for counts in data[1:]))
-    rays = ExceedanceCounts(z, *(np.broadcast_to(counts, (_RAY_COUNT, z.size)) for counts in merged[1:]))
+    log_x, index = np.unique(data.log_x, return_inverse=True)
+    merged = ExceedanceCounts(log_x, *(np.bincount(index, counts).astype(np.float64) for counts in data[1:]))
+    rays = ExceedanceCounts(log_x, *(np.broadcast_to(counts, (_RAY_COUNT, log_x.size)) for counts in merged[1:]))
     maximum = np.column_stack(best)
     floor = compute_log_likelihood(merged.as_batch(), maximum)[0] - drop
     angle = np.linspace(0.0, 2.0 * math.pi, _RAY_COUNT, endpoint=False)
@@ -368,7 +370,7 @@ def _trace_region(data: ExceedanceCounts, best: Probit, drop: float) -> Floats:
         points = maximum + distance[:, None] * directions
         excess = compute_log_likelihood(rays, points) - floor
         with np.errstate(over="ignore", invalid="ignore"):
-            descent = -np.sum(_differentiate(rays, points)[0] * directions, axis=1)
+            descent = -np.sum(_compute_score_and_information(rays, points)[0] * directions, axis=1)
         is_outside = (excess < 0.0) & (descent > 0.0)
         step = excess[is_outside] / descent[is_outside]
         distance[is_outside] += step
@@ -387,7 +389,7 @@ def _cut_at_zero_slope(boundary: Floats) -> Floats:
     return np.vstack([boundary[is_rising], np.column_stack([corners, np.zeros(share.size)])])
 
 
-def _compute_stretch(data: ExceedanceCounts, clusters: Integers, best: Probit) -> Floats:
+def _compute_stretch_matrix(data: ExceedanceCounts, clusters: Integers, best: Probit) -> Floats:
     """Compute the linear map from the covariance of the likelihood to the covariance of the clusters."""
     scores, informations = _sum_by_cluster(data, clusters, best)
     count = len(scores)
@@ -403,14 +405,15 @@ def _compute_stretch(data: ExceedanceCounts, clusters: Integers, best: Probit) -
 
 def _sum_by_cluster(data: ExceedanceCounts, clusters: Integers, fitted: Probit) -> tuple[Floats, Floats]:
     """Sum score and observed information of each cluster, shapes (clusters, 2) and (clusters, 2, 2)."""
-    z, exceeded, trials = data
-    z_scores = fitted.intercept + fitted.slope * z
+    log_x, exceedances, trial_counts = data
+    z_scores = fitted.intercept + fitted.slope * log_x
     density, log_below, log_above = _compute_log_normals(z_scores)
     ratio_below, ratio_above = np.exp(density - log_below), np.exp(density - log_above)
-    weight_below, weight_above = exceeded * ratio_below, (trials - exceeded) * ratio_above
+    weight_below, weight_above = exceedances * ratio_below, (trial_counts - exceedances) * ratio_above
     score = weight_below - weight_above
     information = weight_below * (ratio_below + z_scores) + weight_above * (ratio_above - z_scores)
-    scores = np.stack([np.bincount(clusters, score * power) for power in (np.ones_like(z), z)], axis=1)
-    level, mixed, square = (np.bincount(clusters, information * power) for power in (np.ones_like(z), z, z * z))
+    powers = np.ones_like(log_x), log_x, log_x * log_x
+    scores = np.stack([np.bincount(clusters, score * power) for power in powers[:2]], axis=1)
+    level, mixed, square = (np.bincount(clusters, information * power) for power in powers)
     informations = np.stack([level, mixed, mixed, square], axis=1).reshape(-1, 2, 2)
     return np.asarray(scores, dtype=np.float64), np.asarray(informations, dtype=np.float64)

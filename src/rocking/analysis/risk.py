@@ -134,7 +134,7 @@ class Risk(Result):
     Examples
     --------
     >>> from rocking import HazardCurve, fit_fragility
-    >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4)
+    >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trial_counts=4)
     >>> round(fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4])).rate("overturning").annual_rate, 6)
     0.000434
     """
@@ -292,7 +292,7 @@ class Survival(Result):
     Examples
     --------
     >>> from rocking import HazardCurve, fit_fragility
-    >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4, measure="pga")
+    >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trial_counts=4, measure="pga")
     >>> survival = fitted.survival(1000.0, HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
     >>> f"probability of survival {survival.probability:.3f}"
     'probability of survival 0.648'
@@ -390,7 +390,7 @@ class Survival(Result):
             ]
         lines = [
             f"{self.curve.limit_state}: not in {format_count(self.years, 'year')}; intensity: {measure.label}",
-            f"most likely never {self._describe_never}: one such motion would have exceeded the limit with {percent}",
+            f"most likely never {self._rare_motion_text}: one such motion would have exceeded the limit with {percent}",
             f"largest rates of motions of an intensity or more; with larger ones the limit would have been "
             f"exceeded with {percent}" + (", if each met another of the blocks" if self.has_several_blocks else ""),
             "",
@@ -407,7 +407,7 @@ class Survival(Result):
         return float(intensities.min()), float(intensities.max())
 
     @property
-    def _describe_never(self) -> str:
+    def _rare_motion_text(self) -> str:
         intensity, highest = self.never_reached_intensity, self._known_range[1]
         text = format_intensity(min(intensity, highest), self.measure)
         return f"some intensity above {text}, beyond the data" if intensity > highest else f"{text} or more"
@@ -416,12 +416,12 @@ class Survival(Result):
         """Describe the probability of the survival under the hazard curve."""
         low, high = rate.bounds
         bounds = math.exp(-high * self.years), math.exp(-low * self.years)
-        chance, interval_text = format_digits(self.probability, self.interval, bounds)
+        probability_text, interval_text = format_digits(self.probability, self.interval, bounds)
         confidence, likeliest = 100.0 * self.curve.confidence, self.probability
-        estimate = f"{chance} ({confidence:g} % interval {interval_text})"
+        estimate = f"{probability_text} ({confidence:g} % interval {interval_text})"
         if self.has_several_blocks:
-            single = f"at most {self.max_probability:.2g} if one of the blocks has stood all the time"
-            estimate = f"{single}, and {estimate} if each motion met another of them"
+            single_text = f"at most {self.max_probability:.2g} if one of the blocks has stood all the time"
+            estimate = f"{single_text}, and {estimate} if each motion met another of them"
         if not math.isnan(self.mean_probability):
             likeliest = self.mean_probability
             estimate = (
@@ -487,7 +487,7 @@ class Survival(Result):
 
     def _format_headline(self) -> str:
         state, years = self.curve.limit_state, format_count(self.years, "year")
-        return f"{state}: not in {years}; most likely never {self._describe_never}"
+        return f"{state}: not in {years}; most likely never {self._rare_motion_text}"
 
 
 def compute_mean_survival(
@@ -497,14 +497,14 @@ def compute_mean_survival(
     table = outcomes.sort_values("block", kind="stable")
     blocks = table.drop_duplicates("block")
     values = table[[column, f"exceeded_{limit_state}", "unfinished"]].to_numpy(np.float64)
-    intensity, exceeded, missing = values.T.reshape(3, len(blocks), -1)
-    fits = fit_or_limits(ExceedanceCounts(np.log(intensity[0]), exceeded, 1.0 - missing))
+    intensity, exceedance_counts, missing_counts = values.T.reshape(3, len(blocks), -1)
+    fits = fit_or_limits(ExceedanceCounts(np.log(intensity[0]), exceedance_counts, 1.0 - missing_counts))
     # For a curve that does not rise, the rate below the hazard curve is unbounded and therefore omitted.
-    rising, level = compute_log_rate(fits, hazard), compute_log_rate_within(fits, hazard)
-    rates = np.exp(np.where(fits.slope > 0.0, rising[:, 0], level[:, 0]))
+    log_rates, level_log_rates = compute_log_rate(fits, hazard), compute_log_rate_within(fits, hazard)
+    rates = np.exp(np.where(fits.slope > 0.0, log_rates[:, 0], level_log_rates[:, 0]))
     probabilities, weights = np.exp(-years * rates), np.asarray(blocks.get("weight", np.ones(len(blocks))), np.float64)
     shares = weights / weights.sum()
-    mean = float(shares @ probabilities)
-    count = 1.0 / float(shares @ shares)  # of equally weighted blocks with this error
-    variance = float(shares @ (probabilities - mean) ** 2)
-    return mean, math.sqrt(variance / (count - 1.0)) if count > 1.0 else math.nan
+    mean_probability = float(shares @ probabilities)
+    effective_count = 1.0 / float(shares @ shares)  # of equally weighted blocks with this error
+    variance = float(shares @ (probabilities - mean_probability) ** 2)
+    return mean_probability, math.sqrt(variance / (effective_count - 1.0)) if effective_count > 1.0 else math.nan

@@ -134,23 +134,24 @@ def rocking_spectrum(
         ratio = compute_ratios(axes["alpha"].reshape(-1, *[1] * (len(names) - 1)), *outcomes)
         values = [*outcomes[:2], ratio, compute_fractiles(ratio, shares), compute_overturned_share(ratio)]
         return RockingSpectrum(_combine_peaks(table, names, values, axes | {"fractile": shares}))
-    weight = normalise_weights(weights, len(bodies))
-    median = float(compute_weighted_fractiles(bodies.p.mean(axis=1), weight, _MEDIAN_SHARE)[0])
+    block_weights = normalise_weights(weights, len(bodies))
+    median = float(compute_weighted_fractiles(bodies.p.mean(axis=1), block_weights, _MEDIAN_SHARE)[0])
     p_values = median * np.geomspace(0.5, 2.0, 25)
     if p is not None or size is not None:
         p_values = checks.positive_numbers(resolve_p(p, size, bodies.gravity), "p", OptionError)
-    count, n = len(p_values), len(bodies)
-    checks.check_grid_size({"motions": len(motions), "blocks": n, "p": count}, OptionError)
-    resized = bodies.select(np.repeat(np.arange(n), count)).with_p_scaled(np.tile(p_values / median, n))
+    p_count, block_count = len(p_values), len(bodies)
+    checks.check_grid_size({"motions": len(motions), "blocks": block_count, "p": p_count}, OptionError)
+    repeated = bodies.select(np.repeat(np.arange(block_count), p_count))
+    resized = repeated.with_p_scaled(np.tile(p_values / median, block_count))
     table = simulate_many(resized, motions, **options)
     table = table.transpose("motion", "block")
-    outcomes = [table[name].values.reshape(-1, n, count) for name in RATIO_VARIABLES]
+    outcomes = [table[name].values.reshape(-1, block_count, p_count) for name in RATIO_VARIABLES]
     ratio = compute_ratios(bodies.alpha.min(axis=1)[:, None], *outcomes)
-    flat, tiled = ratio.reshape(-1, count), np.tile(weight, len(ratio))
-    fractile_values = compute_weighted_fractiles(flat, tiled, shares)
-    values = [*outcomes[:2], ratio, fractile_values, compute_overturned_share(flat, tiled)]
+    flat_ratios, tiled_weights = ratio.reshape(-1, p_count), np.tile(block_weights, len(ratio))
+    fractile_values = compute_weighted_fractiles(flat_ratios, tiled_weights, shares)
+    values = [*outcomes[:2], ratio, fractile_values, compute_overturned_share(flat_ratios, tiled_weights)]
     data = _combine_peaks(table, ("block", "p"), values, {"p": p_values, "fractile": shares})
-    data = data.assign_coords(weight=("block", weight))
+    data = data.assign_coords(weight=("block", block_weights))
     return RockingSpectrum(data.assign_attrs(blocks=describe_pool(bodies, weights)))
 
 
@@ -254,7 +255,7 @@ class RockingSpectrum(DatasetResult):
         self,
         ax: Axes | None = None,
         *,
-        against: Abscissa = "p",
+        abscissa: Abscissa = "p",
         title: str = "",
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
@@ -265,7 +266,7 @@ class RockingSpectrum(DatasetResult):
         """
         from rocking.plot.curves import SpectrumCurves, draw_spectrum
 
-        checks.choice(against, "against", OptionError, get_args(Abscissa))
+        checks.choice(abscissa, "abscissa", OptionError, get_args(Abscissa))
         # Lines are drawn in the order of the abscissa, whatever the order of p.
         data = self.data.sortby("p") if "p" in self.data.dims else self.data
         names, datasets = zip(*split_curves(data), strict=True)
@@ -274,11 +275,11 @@ class RockingSpectrum(DatasetResult):
         title_parts = [describe_motions(data), *(names if len(names) == 1 else ()), f"{data.model} model"]
         labels = names if len(names) > 1 else ("",)
         return draw_spectrum(
-            x=data[against].values,
+            x=data[abscissa].values,
             curves=[*map(SpectrumCurves, labels, map(self._select_peaks, datasets), fractiles, shares)],
             fractiles=data.fractile.values.tolist(),
             motions=create_motion_labels(data),
-            x_label={"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}[against],
+            x_label={"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}[abscissa],
             title=title or escape_dollars(", ".join(title_parts)),
             ax=ax,
             figsize=figsize,

@@ -76,16 +76,16 @@ class BlocksUnderRecords(Result):
     def _create_labels(self) -> list[dict[str, Any]]:
         """Create the first columns of each row: labels of the block, record, motion, block."""
         bodies = self.bodies
-        count = len(self.responses) // len(bodies)
+        record_count = len(self.responses) // len(bodies)
         gathered = gather_bodies(bodies if len(bodies) > 1 else bodies[0])
         names = [*list_labels(gathered)]
         columns = {
-            _add_attribute_unit(name, attributes): np.repeat(values, count).tolist()
+            _add_attribute_unit(name, attributes): np.repeat(values, record_count).tolist()
             for name, (_, values, attributes) in body_coordinates(gathered).items()
         }
         rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
         motions = [require_motion(response) for response in self.responses]
-        records = create_record_columns(self.records[:count], motions[:count]) * len(bodies)
+        records = create_record_columns(self.records[:record_count], motions[:record_count]) * len(bodies)
         blocks = [{"block": response.block.description} for response in self.responses]
         return [
             {name: row[name] for name in names} | record | block | row
@@ -103,13 +103,13 @@ class BlocksUnderRecords(Result):
 
     def _format_headline(self) -> str:
         """Summarise the number of records that overturn the block."""
-        overturned = sum(response.overturned and response.perturbed().is_decided for response in self.responses)
+        overturned_count = sum(response.overturned and response.perturbed().is_decided for response in self.responses)
         if len(self.bodies) > 1:
-            count = len(self.responses) // len(self.bodies)
-            pairs = f"{format_count(len(self.bodies), 'block')} under {format_count(count, 'record')}"
-            return f"{pairs}: {overturned} of {len(self.responses)} overturn"
+            record_count = len(self.responses) // len(self.bodies)
+            pairs = f"{format_count(len(self.bodies), 'block')} under {format_count(record_count, 'record')}"
+            return f"{pairs}: {overturned_count} of {len(self.responses)} overturn"
         text = format_count(len(self.records), "record")
-        return f"{self.bodies[0].description}: {text}, overturned by {overturned}"
+        return f"{self.bodies[0].description}: {text}, overturned by {overturned_count}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -164,10 +164,10 @@ class Survey(BlocksUnderRecords):
         return f"{self._format_headline()}\n\n{table}"
 
     def _format_headline(self) -> str:
-        undecided = sum(
+        undecided_count = sum(
             item.ended_early or item.unfinished or not item.perturbed().is_decided for item in self.responses
         )
-        undecided_text = f", undecided under {undecided}" if undecided else ""
+        undecided_text = f", undecided under {undecided_count}" if undecided_count else ""
         skipped_text = f"; {format_count(len(self.skipped), 'record')} skipped" if self.skipped else ""
         return super()._format_headline() + undecided_text + skipped_text
 
@@ -249,10 +249,10 @@ class RuleComparison(BlocksUnderRecords):
             "demand over capacity: from 1 on a rule predicts overturning; simulated: one over the lowest factor on the "
             "motion that was found to overturn the block, in steps of 5 %"
         )
-        counts = ["", *self._count_disagreements(rules)] if rules else []
+        count_lines = ["", *self._count_disagreements(rules)] if rules else []
         notes = (f"note: {note}" for note in self._list_notes())
         heading = str(self.bodies[0]) if len(self.bodies) == 1 else self._format_headline()
-        return "\n".join([heading, explanation, "", table, *counts, *notes])
+        return "\n".join([heading, explanation, "", table, *count_lines, *notes])
 
     def to_dict(self) -> dict[str, Any]:
         return super().to_dict() | {"notes": self._list_notes()}
@@ -265,23 +265,23 @@ class RuleComparison(BlocksUnderRecords):
 
     def _count_disagreements(self, rules: list[str]) -> list[str]:
         """Count the errors of each rule, without records for which no single number can be right."""
-        lines, excluded = [], self.overturns_when_scaled_down
+        lines, is_excluded = [], self.overturns_when_scaled_down
         compared = [
             (ratios, response.overturned)
-            for ratios, response, is_ambiguous in zip(self.ratios, self.responses, excluded, strict=True)
+            for ratios, response, is_ambiguous in zip(self.ratios, self.responses, is_excluded, strict=True)
             if not (is_ambiguous or response.unfinished)
         ]
-        count, total = len(compared), len(excluded)
+        count, total_count = len(compared), len(is_excluded)
         for rule in rules:
-            unsafe = sum(ratios[rule] < 1.0 and overturned for ratios, overturned in compared)
-            conservative = sum(ratios[rule] >= 1.0 and not overturned for ratios, overturned in compared)
-            errors = f"unsafe {unsafe}, over-conservative {conservative} of {count}"
-            lines.append(f"{format_rule_name(rule)}: right {count - unsafe - conservative}, {errors}")
-        if any(excluded):
+            unsafe_count = sum(ratios[rule] < 1.0 and overturned for ratios, overturned in compared)
+            conservative_count = sum(ratios[rule] >= 1.0 and not overturned for ratios, overturned in compared)
+            errors = f"unsafe {unsafe_count}, over-conservative {conservative_count} of {count}"
+            lines.append(f"{format_rule_name(rule)}: right {count - unsafe_count - conservative_count}, {errors}")
+        if any(is_excluded):
             reason = "where the block stands under the motion as it is, but falls under the same motion scaled down"
-            lines.append(f"not counted: {sum(excluded)} of {total}, {reason}")
-        if unfinished := sum(response.unfinished for response in self.responses):
-            lines.append(f"not counted: {unfinished} of {total}, whose simulation was not finished")
+            lines.append(f"not counted: {sum(is_excluded)} of {total_count}, {reason}")
+        if unfinished_count := sum(response.unfinished for response in self.responses):
+            lines.append(f"not counted: {unfinished_count} of {total_count}, whose simulation was not finished")
         return lines
 
 

@@ -61,7 +61,7 @@ def assess(
     chattering: str | ChatteringScheme = "certified",
     confidence: float = 0.9,
     years: float = 50.0,
-    samples: int = 50,
+    sample_count: int = 50,
 ) -> Assessment:
     """Assess which objects overturn, at which intensity, and how often at a site.
 
@@ -91,7 +91,7 @@ def assess(
         As for `fragility`. Labels of clusters are those of all motions.
     years : float
         Time of the probabilities, years.
-    samples : int
+    sample_count : int
         Number of sampled blocks of an object with uncertain sizes in an `Inventory`.
 
     Returns
@@ -123,40 +123,40 @@ def assess(
     """
     checks.fraction(confidence, "confidence", OptionError)
     checks.positive(years, "years", OptionError)
-    checks.integer(samples, "samples", OptionError, 2)
+    checks.integer(sample_count, "sample_count", OptionError, 2)
     if isinstance(levels, int):
         checks.integer(levels, "levels", OptionError, 2)
     intensity = Measure.parse(measure)
     check_measure(hazard, intensity)
     named, unusable = index_motions(motions), dict[str, str]()
-    failed = dict(blocks.failures) if isinstance(blocks, Inventory) else {}
+    failures = dict(blocks.failures) if isinstance(blocks, Inventory) else {}
     is_usable = [_is_scalable(name, motion, intensity, unusable) for name, motion in named.items()]
     usable = dict(compress(named.items(), is_usable))
     if not usable:
         raise OptionError(escape_braces(f"no motion can be scaled; the first: {next(iter(unusable.values()))}"))
     if clusters is not None and not isinstance(clusters, str):
         clusters = assign_groups(clusters, "clusters", len(named), "motion")[is_usable]
-    several: Any = blocks if isinstance(blocks, Sequence | Bodies) else [blocks]
-    bodies: list[Body] = [*several]
+    block_list: Any = blocks if isinstance(blocks, Sequence | Bodies) else [blocks]
+    bodies: list[Body] = [*block_list]
     options: dict[str, Any] = {"model": model, "polarity": polarity, "chattering": chattering}
     study = _Study([*usable.values()], intensity, hazard, levels, clusters, confidence, options)
     objects = list[ObjectAssessment]()
     with Progress("assessing", total=len(bodies)) as bar:
         for k, (name, body) in enumerate(zip(list_names(bodies), bodies, strict=True)):
             try:
-                sample = blocks.sample(k, samples) if isinstance(blocks, Inventory) else None
+                sample = blocks.sample(k, sample_count) if isinstance(blocks, Inventory) else None
                 objects.append(study.assess(name, body, sample, friction))
             except RockingError as error:
-                failed[name] = str(error)
+                failures[name] = str(error)
             bar.advance()
     if not objects:
-        reasons = "; ".join(f"{name}: {reason}" for name, reason in failed.items())
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in failures.items())
         raise OptionError(escape_braces(f"no object can be assessed: {reasons}"))
     objects.sort(key=lambda item: item.order_vulnerability(hazard))
     numbers = assign_clusters([*usable.values()], clusters)
     ranks = dict(zip(("rank_best", "rank_worst"), compute_ranks(objects, numbers, hazard, confidence), strict=True))
     data = create_dataset(objects, usable, intensity, ranks, {"model": model, "polarity": polarity})
-    return Assessment(tuple(objects), usable, intensity, hazard, failed, unusable, years, confidence, model, data)
+    return Assessment(tuple(objects), usable, intensity, hazard, failures, unusable, years, confidence, model, data)
 
 
 def _is_scalable(name: str, motion: Motion, measure: Measure, unusable: dict[str, str]) -> bool:
@@ -200,11 +200,11 @@ class _Study:
         except FitError as error:
             fault, outcomes = error.text().partition(": ")[2] or error.text(), error.outcomes
         assert outcomes is not None
-        exceeded = outcomes.exceeded_overturning.where(~outcomes.unfinished).to_numpy(float)
-        shares = np.nanmean(exceeded.reshape(len(levels), len(self.motions), -1), axis=2)
+        exceedances = outcomes.exceeded_overturning.where(~outcomes.unfinished).to_numpy(float)
+        shares = np.nanmean(exceedances.reshape(len(levels), len(self.motions), -1), axis=2)
         rate = None if fitted is None or self.hazard is None else fitted.annual_rate(self.hazard).rates[0]
-        count = 1 if sample is None else len(sample)
-        return ObjectAssessment(name, body, count, coefficient, fitted, fault, rate, levels, shares, unscaled)
+        block_count = 1 if sample is None else len(sample)
+        return ObjectAssessment(name, body, block_count, coefficient, fitted, fault, rate, levels, shares, unscaled)
 
     def _choose_levels(self, blocks: Bodies, options: Mapping[str, Any]) -> Floats:
         """Return levels from below the first overturning of a coarse search to its last, in equal ratios."""
@@ -215,13 +215,13 @@ class _Study:
         lowest = compute_lowest_uplift(blocks, self.motions, values, measure, model)
         power, pgas = measure.exponent, np.array([motion.pga for motion in self.motions])
         strongest = float(np.median(values * (_MAX_PGA / pgas) ** power))
-        unit = float(compute_block_units(blocks, measure, model).min())
-        highest = min(max(2.0**power * lowest, strongest / unit), 64.0**power * lowest)
-        search = np.geomspace(lowest, highest, _SEARCH_COUNT)
-        table = simulate_levels(blocks, self.motions, measure, search, **{**options, "polarity": "+"})
+        block_unit = float(compute_block_units(blocks, measure, model).min())
+        highest = min(max(2.0**power * lowest, strongest / block_unit), 64.0**power * lowest)
+        grid = np.geomspace(lowest, highest, _SEARCH_COUNT)
+        table = simulate_levels(blocks, self.motions, measure, grid, **{**options, "polarity": "+"})
         shares = table.overturned.mean([name for name in table.overturned.dims if name != "level"]).values
         first, last = int(np.argmax(shares > 0.0)), int(np.argmax(shares >= _LAST_SHARE))
-        low = search[max(first - 1, 0)] if shares.any() else search[0]
-        levels = np.geomspace(low, search[last] if shares[last] >= _LAST_SHARE else search[-1], self.levels)
+        low = grid[max(first - 1, 0)] if shares.any() else grid[0]
+        levels = np.geomspace(low, grid[last] if shares[last] >= _LAST_SHARE else grid[-1], self.levels)
         scale = measure.display_factor
         return np.array([float(f"{scale * level:.3g}") / scale for level in levels])  # as they are displayed

@@ -31,15 +31,15 @@ _INTENSITY: Final = "intensity"
 
 #: Name, meaning, unit and value of the quantities of an object, of an object under each motion, at each level, and of
 #: a motion.
-_OBJECT: Final[Sequence[tuple[str, str, str, Callable[[ObjectAssessment], Any]]]] = (
+_OBJECT_ROWS: Final[Sequence[tuple[str, str, str, Callable[[ObjectAssessment], Any]]]] = (
     ("description", "", "", lambda item: item.body.description),
-    ("samples", "sampled blocks of uncertain size", "1", lambda item: item.samples),
+    ("samples", "sampled blocks of uncertain size", "1", lambda item: item.sample_count),
     ("uplift", "lowest uplift acceleration", "m/s^2", lambda item: item.uplift_acceleration),
     ("friction", "static friction of the simulations; NaN: no slip", "1", lambda item: item.static_friction),
     ("slides_first", "whether it slides instead of rocking", "", lambda item: item.slides_first),
     ("fault", "why there is no curve", "", lambda item: item.fault),
 )
-_OUTCOME: Final[Sequence[tuple[str, str, str, Callable[[ObjectAssessment], Any]]]] = (
+_OUTCOME_ROWS: Final[Sequence[tuple[str, str, str, Callable[[ObjectAssessment], Any]]]] = (
     ("overturned", "whether the unscaled motion overturns the object", "", lambda item: item.unscaled.overturned),
     ("undecided", "whether that changes within 3e-6 of the motion", "", lambda item: item.unscaled.undecided),
     ("unfinished", "whether the simulation was abandoned, or lost contact", "", lambda item: item.unscaled.unfinished),
@@ -48,11 +48,11 @@ _OUTCOME: Final[Sequence[tuple[str, str, str, Callable[[ObjectAssessment], Any]]
     ("overturns_at", "lowest level that overturns, infinite if none", _INTENSITY, lambda item: item.first_levels[1]),
     ("largest_slip", "largest displacement of the base", "m", lambda item: item.largest_slip),
 )
-_LEVEL: Final[Sequence[tuple[str, str, str, Callable[[ObjectAssessment], Any]]]] = (
+_LEVEL_ROWS: Final[Sequence[tuple[str, str, str, Callable[[ObjectAssessment], Any]]]] = (
     ("intensity", "level of the measure", _INTENSITY, lambda item: item.levels),
     ("overturned_share", "share that overturns", "1", lambda item: item.share.mean(axis=1)),
 )
-_MOTION: Final[Sequence[tuple[str, str, str, Callable[[Motion], Any]]]] = (
+_MOTION_ROWS: Final[Sequence[tuple[str, str, str, Callable[[Motion], Any]]]] = (
     ("step", "sampling step", "s", lambda motion: motion.dt or math.nan),
     ("duration", "duration", "s", lambda motion: motion.duration),
     ("pga", "peak ground acceleration", "m/s^2", lambda motion: motion.pga),
@@ -64,14 +64,14 @@ _MOTION: Final[Sequence[tuple[str, str, str, Callable[[Motion], Any]]]] = (
 )
 
 #: Name of estimates with an interval: attributes of an object, of the estimate and of its interval; meaning and unit.
-_ESTIMATES: Final = (
+_ESTIMATE_ROWS: Final = (
     ("median", "curve", "median", "median_interval", "intensity with a probability of one half", _INTENSITY),
     ("dispersion", "curve", "dispersion", "dispersion_interval", "logarithmic standard deviation", "1"),
     ("annual_rate", "rate", "annual_rate", "interval", "mean annual rate of overturning", "1/year"),
 )
 
 #: Quantities that are omitted if all are unknown.
-_OPTIONAL: Final = ("largest_slip", "annual_rate", "annual_rate_lower", "annual_rate_upper")
+_OPTIONAL_NAMES: Final = ("largest_slip", "annual_rate", "annual_rate_lower", "annual_rate_upper")
 
 
 def create_dataset(
@@ -92,20 +92,20 @@ def create_dataset(
 
     for name, values in ranks.items():
         add("block", name, values, name.replace("_", " "), "1")
-    for dims, quantities in (("block", _OBJECT), ("block motion", _OUTCOME), ("block level", _LEVEL)):
+    for dims, quantities in (("block", _OBJECT_ROWS), ("block motion", _OUTCOME_ROWS), ("block level", _LEVEL_ROWS)):
         for name, meaning, unit, evaluate in quantities:
             add(dims, name, np.stack([np.asarray(evaluate(item)) for item in objects]), meaning, unit)
-    for name, owner, middle, ends, meaning, unit in _ESTIMATES:
+    for name, owner, middle, ends, meaning, unit in _ESTIMATE_ROWS:
         estimates = [getattr(item, owner) for item in objects]
         rows = [[math.nan] * 3 if item is None else [getattr(item, middle), *getattr(item, ends)] for item in estimates]
         for end, column in zip(("", "_lower", "_upper"), np.array(rows, dtype=float).T, strict=True):
             add("block", name + end, column, meaning + end.replace("_", ", "), unit)
     for rule, ratios in _apply_rules([item.body for item in objects], [*motions.values()]).items():
         add("block motion", rule, ratios, f"demand divided by capacity by the rule {rule}", "1")
-    for name, meaning, unit, evaluate_motion in _MOTION:
+    for name, meaning, unit, evaluate_motion in _MOTION_ROWS:
         add("motion", name, [evaluate_motion(motion) for motion in motions.values()], meaning, unit)
     add("motion", measure.name, compute_intensities([*motions.values()], measure), measure.quantity, _INTENSITY)
-    unknown = [name for name in _OPTIONAL if np.isnan(variables[name][1]).all()]
+    unknown = [name for name in _OPTIONAL_NAMES if np.isnan(variables[name][1]).all()]
     coordinates = {
         **motion_coordinates([*motions.values()]),
         **body_coordinates(gather_bodies([item.body for item in objects])),

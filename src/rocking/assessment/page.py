@@ -15,7 +15,7 @@ import numpy as np
 
 from rocking.analysis.levels import compute_block_units
 from rocking.analysis.risk import describe_extrapolated_shares
-from rocking.assessment.chart import Chart, draw_bar, draw_intervals
+from rocking.assessment.chart import Chart, render_bar, render_intervals
 from rocking.core.constants import STANDARD_GRAVITY, VERSION
 from rocking.core.tables import format_count, list_some, write_text
 from rocking.engine.problem import gather_bodies
@@ -33,16 +33,16 @@ def write_page(assessment: Assessment, path: str | Path, command: str) -> None:
     """Write the report of an assessment."""
     style = Path(__file__).with_name("report.css").read_text("utf-8")
     title = f"Assessment of {format_count(len(assessment.objects), 'object')}"
-    parts = [_write_overview(assessment, title)]
-    parts += [_write_object(assessment, k) for k in range(len(assessment.objects))]
-    parts += [_write_records(assessment), _write_method(assessment, command)]
+    parts = [_render_overview(assessment, title)]
+    parts += [_render_object(assessment, k) for k in range(len(assessment.objects))]
+    parts += [_render_records(assessment), _render_method(assessment, command)]
     head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>'
     body = "\n".join(parts)
     write_text(path, f'<!DOCTYPE html>\n<html lang="en"><head>{head}<style>\n{style}</style></head>\n{body}\n</html>\n')
 
 
-def _write_overview(assessment: Assessment, title: str) -> str:
-    """Write the summary table, the figure of all objects, and failures."""
+def _render_overview(assessment: Assessment, title: str) -> str:
+    """Render the summary table, the figure of all objects, and failures."""
     header, rows = assessment.tabulate()
     labels = assessment.labels
     cells = []
@@ -52,24 +52,24 @@ def _write_overview(assessment: Assessment, title: str) -> str:
     hazard = "" if assessment.hazard is None else f" The hazard curve is {escape(repr(assessment.hazard.name))}."
     basis = "return period of overturning" if assessment.hazard is not None else "median intensity"
     confidence = f"{100 * assessment.confidence:g} %"
-    failures = [f"<li><b>{escape(name)}</b>: {escape(why)}</li>" for name, why in assessment.failures.items()]
-    failed = f'<div class="failed"><h3>Not assessed</h3><ul>{"".join(failures)}</ul></div>' if failures else ""
+    items = [f"<li><b>{escape(name)}</b>: {escape(reason)}</li>" for name, reason in assessment.failures.items()]
+    failure_list = f'<div class="failed"><h3>Not assessed</h3><ul>{"".join(items)}</ul></div>' if items else ""
     return f"""<h1>{title} under {format_count(len(assessment.motions), "ground motion")}</h1>
 <p>Intensity measure: {escape(assessment.measure.label)}.{hazard} Intervals have {confidence} confidence. Objects are
 ranked by their {basis}. The ranks in brackets are plausible with {confidence} confidence: the motions are resampled,
 the same ones for all objects.</p>
-{_write_table([*header[:2], *labels, *header[2:]], cells)}
-{failed}
+{_render_table([*header[:2], *labels, *header[2:]], cells)}
+{failure_list}
 <h3>Median intensity of overturning</h3>
-{_draw_overview(assessment)}
+{_render_medians(assessment)}
 <p class="soft">Dots are medians, bars their {confidence} intervals. Without a fitted curve the bar extends from the
 highest level at which the object stands under all motions to the level at which all motions overturn it; an arrow
 marks a bar without an end. The intervals contain the differences between the ground motions, not the errors of the
 model, of the sizes that are taken as known, and of the selection of the motions.</p>"""
 
 
-def _write_object(assessment: Assessment, k: int) -> str:
-    """Write the page of one object."""
+def _render_object(assessment: Assessment, k: int) -> str:
+    """Render the page of one object."""
     item, data = assessment.objects[k], assessment.data
     labels = {name: assessment.label(name, k) for name in assessment.labels}
     details = [escape(item.body.description.removeprefix(f"{item.name}: "))]
@@ -77,7 +77,7 @@ def _write_object(assessment: Assessment, k: int) -> str:
     scale, unit = assessment.measure.display_factor, assessment.measure.display_unit
     suffix = f", {unit}" if unit else ""
     rules = [rule for rule in RULES if np.isfinite(data[rule].values[k]).all()]
-    longest = scale * item.levels[-1]
+    highest_level = scale * item.levels[-1]
     header = [
         "record",
         "PGA, g",
@@ -91,21 +91,21 @@ def _write_object(assessment: Assessment, k: int) -> str:
     for m, name in enumerate(_shorten_names(assessment.motions)):
         low, high = (scale * float(data[end].values[k, m]) for end in ("stands_up_to", "overturns_at"))
         outcome, peak = _describe_outcome(data, k, m), float(data.peak_over_alpha.values[k, m])
-        recorded = scale * float(data[assessment.measure.name].values[m])
+        recorded_level = scale * float(data[assessment.measure.name].values[m])
         row = [
             escape(name),
             f"{float(data.pga.values[m]) / STANDARD_GRAVITY:.3g}",
             f'<b class="overturns">{outcome}</b>' if outcome == "overturns" else outcome,
             "" if math.isinf(peak) else f"{peak:.2f}",
             f"&gt; {low:.2g}" if math.isinf(high) else f"{low:.2g} to {high:.2g}",
-            draw_bar((low, min(high, longest)), recorded, longest, has_end=high < math.inf),
+            render_bar((low, min(high, highest_level)), recorded_level, highest_level, has_end=high < math.inf),
         ]
         rows.append(row + [f"{float(data[rule].values[k, m]):.2f}" for rule in rules])
     statements = "".join(f"<li>{escape(text)}</li>" for text in describe_object(assessment, k))
-    table = _write_table(header, rows, is_dense=True)
+    table = _render_table(header, rows, is_dense=True)
     return f"""<section id="object-{k + 1}"><h2>{k + 1}. {escape(item.name)}</h2>
 <p class="soft">{"; ".join(details)}</p>
-{_draw_fragility(assessment, item)}
+{_render_fragility(assessment, item)}
 <ul>{statements}</ul>
 <h3>Each record</h3>
 {table}
@@ -130,12 +130,12 @@ def describe_object(assessment: Assessment, k: int) -> list[str]:
     """Describe the results of an object and their certainty, one statement each."""
     item, data, measure = assessment.objects[k], assessment.data, assessment.measure
     names = np.array(_shorten_names(assessment.motions))
-    overturned, total = data.overturned.values[k], len(names)
-    listed = f" ({list_some(names[overturned].tolist())})" if overturned.any() else ""
-    text = f"Under the records as they are it overturns in {overturned.sum()} of {total}{listed}"
-    undecided = data.undecided.values[k]
-    if undecided.any():
-        text += f"; {undecided.sum()} outcomes are undecided, because they change within 3e-6 of the motion"
+    is_overturned, record_count = data.overturned.values[k], len(names)
+    listed = f" ({list_some(names[is_overturned].tolist())})" if is_overturned.any() else ""
+    text = f"Under the records as they are it overturns in {is_overturned.sum()} of {record_count}{listed}"
+    is_undecided = data.undecided.values[k]
+    if is_undecided.any():
+        text += f"; {is_undecided.sum()} outcomes are undecided, because they change within 3e-6 of the motion"
     statements = [f"{text}."]
     scale, unit = measure.display_factor, f" {measure.display_unit}".rstrip()
     low, high = item.first_levels
@@ -147,27 +147,29 @@ def describe_object(assessment: Assessment, k: int) -> list[str]:
         if low[first] == 0.0:
             bounds = f"at or below {scale * high[first]:.3g}{unit}, the lowest level"
         text = f"Scaled records first overturn it {bounds} ({names[first]})"
-        censored = int(np.isinf(high).sum())
-        text += f"; {censored} of {total} do not up to {scale * item.levels[-1]:.3g}{unit}" if censored else ""
+        if censored_count := int(np.isinf(high).sum()):
+            text += f"; {censored_count} of {record_count} do not up to {scale * item.levels[-1]:.3g}{unit}"
         statements.append(f"{text}.")
     median, interval, dispersion = assessment.format_curve(item)
     if item.curve is None:
         statements.append(f"No fragility curve: {item.fault}.")
     else:
-        simulations = format_count(int(item.curve.trials.sum()), "simulation")
+        simulations = format_count(int(item.curve.trial_counts.sum()), "simulation")
         interval = f"{100 * assessment.confidence:g} % interval {interval}"
         text = f"Half of the motions overturn it at {median}{unit} ({interval}), with a dispersion of {dispersion}, "
         statements.append(f"{text}from {simulations}.")
     statements += _describe_rate(assessment, item)
-    if item.samples > 1:
-        statements.append(f"Its size is uncertain: the curve is of {item.samples} sampled sizes, records of the mean.")
+    if item.sample_count > 1:
+        statements += [
+            f"Its size is uncertain: the curve is of {item.sample_count} sampled sizes, records of the mean."
+        ]
     statements += _describe_sliding(item, data, k)
     for rule in RULES:
         ratios = data[rule].values[k]
         if np.isfinite(ratios).all():
-            right = int(np.count_nonzero((ratios >= 1.0) == overturned))
-            unsafe = int(np.count_nonzero((ratios < 1.0) & overturned))
-            verdict = f"is right for {right} of {total} records, and unsafe for {unsafe}"
+            right_count = int(np.count_nonzero((ratios >= 1.0) == is_overturned))
+            unsafe_count = int(np.count_nonzero((ratios < 1.0) & is_overturned))
+            verdict = f"is right for {right_count} of {record_count} records, and unsafe for {unsafe_count}"
             statements.append(f"The rule {rule.title()} {verdict}.")
     notes = []
     if item.fragility is not None and item.curve is not None:
@@ -210,13 +212,13 @@ def _shorten_names(names: Iterable[str]) -> list[str]:
     return short_names if len({*short_names}) == len(long_names) else long_names
 
 
-def _write_records(assessment: Assessment) -> str:
-    """Write the table of the ground motions, and of the records that are not used."""
+def _render_records(assessment: Assessment) -> str:
+    """Render the table of the ground motions, and of the records that are not used."""
     data, names = assessment.data, _shorten_names(assessment.motions)
-    further = [name for name in data.coords if data[name].dims == ("motion",) and name not in ("motion", "file")]
+    label_names = [name for name in data.coords if data[name].dims == ("motion",) and name not in ("motion", "file")]
     files = [str(file) for file in data["file"].values] if "file" in data.coords else [""] * len(names)
     columns = {"record": names, "file": ["" if file in name else file for file, name in zip(files, names, strict=True)]}
-    columns |= {str(name): [str(value) for value in data[name].values] for name in (*further, "format")}
+    columns |= {str(name): [str(value) for value in data[name].values] for name in (*label_names, "format")}
     numbers = {
         "step, s": ("step", 1.0), "duration, s": ("duration", 1.0), "D5-95, s": ("significant_duration", 1.0),
         "PGA, g": ("pga", STANDARD_GRAVITY), "PGV, m/s": ("pgv", 1.0), "Arias, m/s": ("arias", 1.0),
@@ -229,13 +231,13 @@ def _write_records(assessment: Assessment) -> str:
     columns = {title: texts for title, texts in columns.items() if title == "remarks" or any(texts)}
     rows = [[escape(text) for text in row] for row in zip(*columns.values(), strict=True)]
     unused = zip(_shorten_names(assessment.skipped), assessment.skipped.values(), strict=True)
-    rows += [[escape(name), *[""] * (len(columns) - 2), f"not used: {escape(why)}"] for name, why in unused]
-    table = _write_table([*columns], rows, is_dense=True)
+    rows += [[escape(name), *[""] * (len(columns) - 2), f"not used: {escape(reason)}"] for name, reason in unused]
+    table = _render_table([*columns], rows, is_dense=True)
     return f'<section id="records"><h2>Ground motions</h2>\n{table}</section>'
 
 
-def _write_method(assessment: Assessment, command: str) -> str:
-    """Write assumptions, versions and the command."""
+def _render_method(assessment: Assessment, command: str) -> str:
+    """Render assumptions, versions and the command."""
     options = assessment.data.attrs
     versions = [f"rocking {VERSION}", f"Python {platform.python_version()}"]
     versions += [f"{name} {metadata.version(name)}" for name in ("numpy", "scipy")]
@@ -243,7 +245,7 @@ def _write_method(assessment: Assessment, command: str) -> str:
     measure, values = assessment.measure, assessment.data[assessment.measure.name].values
     units = compute_block_units(gather_bodies([item.body for item in assessment.objects]), measure, assessment.model)
     ends = [unit * item.levels[[0, -1], None] for unit, item in zip(units, assessment.objects, strict=True)]
-    low, high = (fold(measure.find_factor(np.array(ends), values)) for fold in (np.min, np.max))
+    low, high = (find_extreme(measure.find_factor(np.array(ends), values)) for find_extreme in (np.min, np.max))
     assumptions = [
         f"Rigid blocks, {assessment.model} model, events located and chattering certified.",
         f"The levels scale the records by factors of {low:.2g} to {high:.2g}. Scaled weak motions differ from strong "
@@ -254,14 +256,14 @@ def _write_method(assessment: Assessment, command: str) -> str:
         "Objects are numbered by rank, from 1.",
     ]
     items = "".join(f"<li>{escape(text)}</li>" for text in assumptions)
-    shown = f"<p>Command: <code>{escape(command)}</code></p>" if command else ""
+    command_text = f"<p>Command: <code>{escape(command)}</code></p>" if command else ""
     time = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z")
-    return f"""<section id="method"><h2>Method and versions</h2><ul>{items}</ul>{shown}
+    return f"""<section id="method"><h2>Method and versions</h2><ul>{items}</ul>{command_text}
 <p>{escape(", ".join(versions))}; written {time}.</p></section>"""
 
 
-def _draw_overview(assessment: Assessment) -> str:
-    """Draw the median of each object with its interval."""
+def _render_medians(assessment: Assessment) -> str:
+    """Render the median of each object with its interval."""
     scale = assessment.measure.display_factor
     rows, ends = [], list[float]()
     for k, item in enumerate(assessment.objects):
@@ -272,11 +274,11 @@ def _draw_overview(assessment: Assessment) -> str:
             median, (low, high) = curve.median, curve.median_interval
         rows.append((f"{k + 1}. {item.name}", scale * low, scale * median, scale * high))
         ends += [end for end in rows[-1][1:] if 0.0 < end < math.inf]
-    return draw_intervals(rows, (min(ends), max(ends)), assessment.measure.label)
+    return render_intervals(rows, (min(ends), max(ends)), assessment.measure.label)
 
 
-def _draw_fragility(assessment: Assessment, item: ObjectAssessment) -> str:
-    """Draw the fragility curve with its band and the simulated shares."""
+def _render_fragility(assessment: Assessment, item: ObjectAssessment) -> str:
+    """Render the fragility curve with its band and the simulated shares."""
     scale = assessment.measure.display_factor
     chart = Chart(
         (0.0, 1.05 * scale * item.levels[-1]), (0.0, 1.0), assessment.measure.label, "probability of overturning"
@@ -290,9 +292,9 @@ def _draw_fragility(assessment: Assessment, item: ObjectAssessment) -> str:
     return chart.write()
 
 
-def _write_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, is_dense: bool = False) -> str:
-    """Write a table of HTML texts below a heading of plain texts."""
-    kinds = [_choose_kind([row[k] for row in rows]) for k in range(len(header))]
+def _render_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, is_dense: bool = False) -> str:
+    """Render a table of HTML texts below a heading of plain texts."""
+    kinds = [_choose_column_class([row[k] for row in rows]) for k in range(len(header))]
     heading = "".join(f"<th{kind}>{escape(title)}</th>" for kind, title in zip(kinds, header, strict=True))
     lines = ("".join(f"<td{kind}>{cell}</td>" for kind, cell in zip(kinds, row, strict=True)) for row in rows)
     body = "".join(f"<tr>{line}</tr>\n" for line in lines)
@@ -300,7 +302,7 @@ def _write_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, is_den
     return f'<div class="wide"><table{style}><thead><tr>{heading}</tr></thead><tbody>\n{body}</tbody></table></div>'
 
 
-def _choose_kind(cells: Sequence[str]) -> str:
+def _choose_column_class(cells: Sequence[str]) -> str:
     """Return the class of a column: of numbers, or of other short texts such as intervals."""
     if all(_is_number(cell) for cell in cells):
         return ' class="number"'

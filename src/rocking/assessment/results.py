@@ -51,7 +51,7 @@ class ObjectAssessment:
         Name of the object, or its number.
     body : Body
         Block with its labels.
-    samples : int
+    sample_count : int
         Number of sampled blocks of an object with uncertain sizes, otherwise 1.
     friction : float or pair, or None
         Coefficient of friction of the simulations.
@@ -76,7 +76,7 @@ class ObjectAssessment:
 
     name: str
     body: Body
-    samples: int
+    sample_count: int
     friction: Friction | None
     fragility: Fragility | None
     fault: str
@@ -94,10 +94,10 @@ class ObjectAssessment:
     def first_levels(self) -> tuple[Floats, Floats]:
         """Bounds on the lowest level that overturns the object under each motion: 0 and infinite without one."""
         overturns = self.share > 0.0
-        first, exists = overturns.argmax(axis=0), overturns.any(axis=0)
+        first, is_reached = overturns.argmax(axis=0), overturns.any(axis=0)
         bounded = np.concatenate([[0.0], self.levels])
-        high = np.where(exists, self.levels[first], np.inf)
-        return np.where(exists, bounded[first], self.levels[-1]), high
+        high = np.where(is_reached, self.levels[first], np.inf)
+        return np.where(is_reached, bounded[first], self.levels[-1]), high
 
     @property
     def uplift_acceleration(self) -> float:
@@ -140,8 +140,8 @@ class ObjectAssessment:
         ends = [float(bound(levels)) for bound, levels in zip((np.min, np.max), self.first_levels, strict=True)]
         if hazard is not None:
             # The hazard curve does not resolve rates beyond its points.
-            known = np.clip(ends, *hazard.intensity[[0, -1]])
-            periods = 1.0 / hazard.rate_of(known)
+            known_ends = np.clip(ends, *hazard.intensity[[0, -1]])
+            periods = 1.0 / hazard.rate_of(known_ends)
             low, high = ends[0] >= hazard.intensity[0], ends[1] <= hazard.intensity[-1]
             ends = [float(periods[0]) if low else 0.0, float(periods[1]) if high else math.inf]
         return ends[0], ends[0], ends[1]
@@ -193,8 +193,8 @@ class Assessment(Result):
             items += [("record", *item) for item in self.skipped.items()]
             return [Column(name, [item[k] for item in items]) for k, name in enumerate(("kind", "name", "reason"))]
         dimensions = {"objects": {"block"}, "outcomes": {"block", "motion"}, "levels": {"block", "level"}}
-        wanted = dimensions.get(table, {"motion"})
-        names = [name for name, values in self.data.data_vars.items() if {*values.dims} == wanted]
+        table_dimensions = dimensions.get(table, {"motion"})
+        names = [name for name, values in self.data.data_vars.items() if {*values.dims} == table_dimensions]
         return [column for column in dataset_to_columns(self.data[names]) if column.name not in ("level",)]
 
     def summary(self) -> str:
@@ -225,10 +225,8 @@ class Assessment(Result):
         for k, item in enumerate(self.objects):
             first, last = (int(self.data[f"rank_{end}"][k]) for end in ("best", "worst"))
             rank = f"{k + 1}" + (f" ({first}-{last})" if first < last else "")
-            overturned, total = int(self.data.overturned[k].sum()), len(self.motions)
-            rows.append(
-                [rank, item.name, f"{overturned} of {total}", *self.format_curve(item), *self.format_rate(item)]
-            )
+            share = f"{int(self.data.overturned[k].sum())} of {len(self.motions)}"
+            rows.append([rank, item.name, share, *self.format_curve(item), *self.format_rate(item)])
         return header, rows
 
     def format_curve(self, item: ObjectAssessment) -> list[str]:
@@ -291,5 +289,5 @@ class Assessment(Result):
     def _format_headline(self) -> str:
         objects, motions = format_count(len(self.objects), "object"), format_count(len(self.motions), "motion")
         text = f"{objects} under {motions}, {self.model} model"
-        failed = f"; {len(self.failures)} not assessed" if self.failures else ""
-        return f"{text}; intensity: {self.measure.label}{failed}"
+        failure_text = f"; {len(self.failures)} not assessed" if self.failures else ""
+        return f"{text}; intensity: {self.measure.label}{failure_text}"

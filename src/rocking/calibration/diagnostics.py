@@ -63,8 +63,8 @@ class Scores:
             raise OptionError(f"probabilities and outcomes must have the same shape; got {shapes}")
         if not np.all((predicted >= 0.0) & (predicted <= 1.0)):
             raise OptionError("{} must be between 0 and 1", "probabilities")
-        terms = (predicted > 0.5) == actual, compute_log_losses(predicted, actual), (predicted - actual) ** 2
-        return cls(*(float(np.mean(values)) for values in terms))
+        scores = (predicted > 0.5) == actual, compute_log_losses(predicted, actual), (predicted - actual) ** 2
+        return cls(*(float(np.mean(values)) for values in scores))
 
 
 def compute_log_losses(probabilities: Floats, observed: Flags) -> Floats:
@@ -168,26 +168,27 @@ class Diagnostics:
 
 def diagnose(search: SearchResult, populations: Floats) -> Diagnostics:
     """Compute the diagnostics of a search from the draws of its posterior."""
-    candidates, effective = search.evidence.candidates, float(np.median(search.evidence.count_effective(populations)))
+    candidates = search.evidence.candidates
+    effective_count = float(np.median(search.evidence.count_effective(populations)))
     bounds_reached = list_bounds_reached(candidates.space, split_populations(populations)[0])
-    return Diagnostics(len(candidates.points), effective, search.r_hat, bounds_reached)
+    return Diagnostics(len(candidates.points), effective_count, search.r_hat, bounds_reached)
 
 
 def list_bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ...]:
     """Return estimates whose interval ends at a bound, from draws of the population's centre."""
-    reached = []
+    bounds_reached = []
     for name, values in space.parameters_by_name(centres).items():
         parameter = name.partition("_")[0]
         if parameter not in space.unknown:
             continue
         k, logs, max_value = space.unknown.index(parameter), np.log(values), MAX_VALUES[parameter]
         low, high = float(space.lower[k]), float(space.upper[k])
-        edge = _EDGE_SHARE * (high - low)
-        ends = ("lower", low, 0.5, logs < low + edge), ("upper", high, 2.0, logs > high - edge)
+        edge_width = _EDGE_SHARE * (high - low)
+        ends = ("lower", low, 0.5, logs < low + edge_width), ("upper", high, 2.0, logs > high - edge_width)
         for end, bound, factor, is_near in ends:
             share = float(is_near.mean())
             # Bounds at the largest possible value cannot be widened.
             if share > 0.05 and bound < math.log(max_value) - 1e-9:
                 wider = min(factor * math.exp(bound), max_value)
-                reached.append(BoundReached(name, end, math.exp(bound), wider, share))
-    return tuple(reached)
+                bounds_reached.append(BoundReached(name, end, math.exp(bound), wider, share))
+    return tuple(bounds_reached)

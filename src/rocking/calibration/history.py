@@ -47,7 +47,7 @@ _START_COUNT: Final = 2048
 _FIT_STAGES: Final = ((0.15, 16), (0.3, 8), (0.6, 4), (1.0, 2))
 
 #: Number of points then tried around the optimum, and widths of the clouds in standard errors.
-_CLOUD_SIZE: Final = 64
+_CLOUD_POINT_COUNT: Final = 64
 _CLOUD_WIDTHS: Final = (6.0, 3.0, 1.5)
 
 
@@ -411,7 +411,7 @@ def _search_nearby(problem: _Problem, optimum: Floats, width: float, rng: np.ran
     """Search within `width` standard errors of an optimum, because a forced response can be rugged on that scale."""
     sample_count = len(problem.times)
     covariance = _compute_covariance(problem, optimum, problem.compute_residuals(optimum, sample_count))
-    offsets = rng.multivariate_normal(np.zeros(len(optimum)), covariance, _CLOUD_SIZE, method="cholesky")
+    offsets = rng.multivariate_normal(np.zeros(len(optimum)), covariance, _CLOUD_POINT_COUNT, method="cholesky")
     cloud = np.clip(optimum + width * offsets, *problem.bounds)
 
     def compute_error(logs: Floats) -> float:

@@ -20,11 +20,11 @@ from rocking.calibration.search import (
     Evidence,
     Problem,
     estimate_share,
+    include_outliers,
     resample,
     sample_posterior,
     search,
     split_populations,
-    with_outliers,
 )
 from rocking.calibration.space import SIDED_PARAMETER, Space, ValueOrBounds, find_parameter_unit
 from rocking.core import checks
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from rocking.plot.curves import Parameter
 
 #: Rounds of moves of draws from the posterior over populations, and draws for a fit without a fold.
-MOVE_ROUNDS: Final = 4
+MOVE_ROUND_COUNT: Final = 4
 DRAW_COUNT: Final = 256
 
 
@@ -106,9 +106,9 @@ class Validation:
     scores_by_repeat: tuple[Scores, ...]
 
     def __repr__(self) -> str:
-        repeat_count, tests = self.probabilities.shape
+        repeat_count, test_count = self.probabilities.shape
         times = "once" if repeat_count == 1 else f"{repeat_count} times"
-        return f"<Validation: {format_count(tests, 'test')}, each left out {times}: {self.scores}>"
+        return f"<Validation: {format_count(test_count, 'test')}, each left out {times}: {self.scores}>"
 
     @property
     def scores(self) -> Scores:
@@ -221,7 +221,7 @@ class Calibration(Result):
             for fold in range(fold_count):
                 is_left_out = fold_numbers == fold
                 fitted, predicted = evidence.select_tests(~is_left_out), evidence.select_tests(is_left_out)
-                populations = sample_posterior(fitted, DRAW_COUNT, MOVE_ROUNDS, rng)
+                populations = sample_posterior(fitted, DRAW_COUNT, MOVE_ROUND_COUNT, rng)
                 row[is_left_out] = predicted.probabilities(populations).mean(axis=0)
         return Validation(probabilities, tuple(Scores.from_predictions(row, self.observed) for row in probabilities))
 
@@ -312,16 +312,16 @@ def simulate_outcomes(blocks: Bodies, motions: Motions, model: Model) -> NDArray
     return np.asarray(outcomes.transpose("block", "motion").values, dtype=np.float32)
 
 
-def compute_probabilities(share: Floats, effective: float, outlier_probability: float) -> Floats:
+def compute_probabilities(share: Floats, effective_count: float, outlier_probability: float) -> Floats:
     """Compute probabilities of recorded outcomes from a share of effective blocks, certain for a known block."""
-    expected = share if math.isinf(effective) else estimate_share(share, effective)
+    expected = share if math.isinf(effective_count) else estimate_share(share, effective_count)
     # Rounding can make a sum of weights exceed 1.
-    return np.clip(with_outliers(expected, outlier_probability), 0.0, 1.0)
+    return np.clip(include_outliers(expected, outlier_probability), 0.0, 1.0)
 
 
-def label_groups(groups: Sequence[object] | None, count: int, fold_count: int) -> NDArray[np.int64]:
+def label_groups(groups: Sequence[object] | None, test_count: int, fold_count: int) -> NDArray[np.int64]:
     """Assign a group number, from 0, to each motion. By default each motion is a group."""
-    labels = assign_groups(range(count) if groups is None else groups, "groups", count)
+    labels = assign_groups(range(test_count) if groups is None else groups, "groups", test_count)
     checks.integer(fold_count, "fold_count", OptionError, 2, int(labels.max()) + 1)
     return labels
 
@@ -419,7 +419,7 @@ def calibrate(
 
     result = search(Problem(space, observed, outlier_probability, simulate_points), candidate_count, rng)
     evidence = result.evidence
-    populations = sample_posterior(evidence, 2 * DRAW_COUNT, MOVE_ROUNDS, rng)
+    populations = sample_posterior(evidence, 2 * DRAW_COUNT, MOVE_ROUND_COUNT, rng)
     weights = evidence.mean_weights(populations)
     selected, counts = np.unique(resample(weights, max_blocks, rng), return_counts=True)
     calibration = Calibration(
@@ -475,11 +475,11 @@ def check_outcomes(overturned: ArrayLike, count: int) -> Flags:
 
 def find_distinct_motions(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
     """Return distinct motions, and the index of each motion among them."""
-    distinct: dict[tuple[bytes, ...], Motion] = {}
+    distinct_motions: dict[tuple[bytes, ...], Motion] = {}
     keys = []
     for motion in motions:
         parts = [part for part in (motion, motion.vertical) if part is not None]
         keys.append(tuple(values.tobytes() for part in parts for values in (part.breakpoints, part.coefficients)))
-        distinct.setdefault(keys[-1], motion)
-    indices = {key: index for index, key in enumerate(distinct)}
-    return [*distinct.values()], [indices[key] for key in keys]
+        distinct_motions.setdefault(keys[-1], motion)
+    indices = {key: index for index, key in enumerate(distinct_motions)}
+    return [*distinct_motions.values()], [indices[key] for key in keys]

@@ -37,7 +37,7 @@ _BATCH_SIZE: Final = 64
 PROPOSAL_WIDTH: Final = 1.2
 
 #: Jeffreys' prior, Beta(1/2, 1/2), of a share estimated from n simulated blocks.
-_JEFFREYS: Final = 0.5
+_PRIOR_COUNT: Final = 0.5
 
 
 def split_populations(populations: Floats) -> tuple[Floats, Floats]:
@@ -46,7 +46,7 @@ def split_populations(populations: Floats) -> tuple[Floats, Floats]:
     return populations[:, :k], np.exp(populations[:, k:])
 
 
-def draw_dispersions(space: Space, centres: Floats, rng: Generator) -> Floats:
+def extend_to_populations(space: Space, centres: Floats, rng: Generator) -> Floats:
     """Draw dispersions from the prior for each centre."""
     scores = rng.standard_normal(centres.shape)
     return np.hstack([centres, np.log(space.dispersions) + _DISPERSION_LOG_DEVIATION * scores])
@@ -59,14 +59,14 @@ def compute_log_prior(space: Space, populations: Floats) -> Floats:
     return np.asarray(-0.5 * (scores**2).sum(axis=1))
 
 
-def draw_points(populations: Floats, width: float, count: int, rng: Generator) -> Floats:
+def sample_points(populations: Floats, width: float, count: int, rng: Generator) -> Floats:
     """Draw points from populations in turn, with dispersions times `width`, shape (count, k)."""
     centre, dispersion = split_populations(populations[np.arange(count) % len(populations)])
     return centre + width * dispersion * rng.standard_normal(centre.shape)
 
 
 def compute_log_density(populations: Floats, width: float, points: Floats) -> Floats:
-    """Compute the log-density of the distribution of `draw_points` at points, shape (n,)."""
+    """Compute the log-density of the distribution of `sample_points` at points, shape (n,)."""
     centre, dispersion = split_populations(populations)
     mean = centre.mean(axis=0)
     centre, centred = centre - mean, points - mean
@@ -100,9 +100,9 @@ class Candidates:
             tuple(proposal for run in runs for proposal in run.proposals),
         )
 
-    def select_tests(self, tests: Flags) -> Candidates:
+    def select_tests(self, is_selected: Flags) -> Candidates:
         """Select some of the motions."""
-        return replace(self, overturned=np.ascontiguousarray(self.overturned[:, tests]))
+        return replace(self, overturned=np.ascontiguousarray(self.overturned[:, is_selected]))
 
     @cached_property
     def log_weights(self) -> Floats:
@@ -111,10 +111,10 @@ class Candidates:
 
     def log_density(self, points: Floats) -> Floats:
         """Compute the log-density of candidates per volume at points in the space, shape (c,)."""
-        parts = [np.full(len(points), np.log(self.filling_count / self.space.volume))]
+        log_terms = [np.full(len(points), np.log(self.filling_count / self.space.volume))]
         for count, proposal in self.proposals:
-            parts.append(np.log(count) + compute_log_density(proposal, PROPOSAL_WIDTH, points))
-        return np.asarray(np.logaddexp.reduce(parts))
+            log_terms.append(np.log(count) + compute_log_density(proposal, PROPOSAL_WIDTH, points))
+        return np.asarray(np.logaddexp.reduce(log_terms))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,9 +125,9 @@ class Evidence:
     observed: Flags
     outlier_probability: float
 
-    def select_tests(self, tests: Flags) -> Evidence:
+    def select_tests(self, is_selected: Flags) -> Evidence:
         """Select some of the tests."""
-        return replace(self, candidates=self.candidates.select_tests(tests), observed=self.observed[tests])
+        return replace(self, candidates=self.candidates.select_tests(is_selected), observed=self.observed[is_selected])
 
     def weights(self, populations: Floats) -> NDArray[np.float32]:
         """Compute the share of each population that each candidate represents, shape (c, n), with row sums 1."""
@@ -140,13 +140,13 @@ class Evidence:
     def mean_weights(self, populations: Floats) -> Floats:
         """Compute weights of the candidates averaged over populations, shape (n,)."""
         batches = np.split(populations, range(_BATCH_SIZE, len(populations), _BATCH_SIZE))
-        parts = [self.weights(batch).sum(axis=0, dtype=np.float64) for batch in batches]
-        return np.asarray(np.sum(parts, axis=0) / len(populations))
+        batch_sums = [self.weights(batch).sum(axis=0, dtype=np.float64) for batch in batches]
+        return np.asarray(np.sum(batch_sums, axis=0) / len(populations))
 
     def probabilities(self, populations: Floats) -> Floats:
         """Compute the probability of overturning for each population and motion, shape (c, m)."""
-        shares, effective = self._compute_shares(populations)
-        return with_outliers(estimate_share(shares, effective[:, None]), self.outlier_probability)
+        shares, effective_counts = self._compute_shares(populations)
+        return include_outliers(estimate_share(shares, effective_counts[:, None]), self.outlier_probability)
 
     def count_effective(self, populations: Floats) -> Floats:
         """Compute the effective number of candidates that represent each population, shape (c,)."""
@@ -156,27 +156,27 @@ class Evidence:
         """Compute the log-likelihood of each population, shape (c,)."""
         if not len(populations):
             return np.zeros(0)
-        chances = with_outliers(self._compute_shares(populations)[0], self.outlier_probability)
-        return np.asarray(np.log(np.where(self.observed, chances, 1.0 - chances)).sum(axis=1))
+        probabilities = include_outliers(self._compute_shares(populations)[0], self.outlier_probability)
+        return np.asarray(np.log(np.where(self.observed, probabilities, 1.0 - probabilities)).sum(axis=1))
 
     def _compute_shares(self, populations: Floats) -> tuple[Floats, Floats]:
         """Compute the share of each population that overturns, shape (c, m), and its effective number of candidates."""
         overturned, powers, factors = self.candidates.overturned, self._powers, self._compute_factors(populations)
         shares = np.empty((len(populations), overturned.shape[1]), np.float32)
-        effective = np.empty(len(populations))
+        effective_counts = np.empty(len(populations))
 
-        def weigh(start: int, end: int) -> None:
+        def compute_batch(start: int, end: int) -> None:
             exponents = np.empty(powers.shape[1], np.float32)
             kernel.write_overturned_fractions(
-                factors[start:end], powers, overturned, exponents, shares[start:end], effective[start:end]
+                factors[start:end], powers, overturned, exponents, shares[start:end], effective_counts[start:end]
             )
 
-        batch = max(-(-len(populations) // choose_thread_count()), 16)
-        starts = range(0, len(populations), batch)
+        batch_size = max(-(-len(populations) // choose_thread_count()), 16)
+        starts = range(0, len(populations), batch_size)
         with ThreadPoolExecutor(max(len(starts), 1)) as pool:
-            list(pool.map(weigh, starts, (start + batch for start in starts)))
+            list(pool.map(compute_batch, starts, (start + batch_size for start in starts)))
         # Rounding can make a share exceed 1.
-        return np.minimum(shares, 1.0, dtype=np.float64), effective
+        return np.minimum(shares, 1.0, dtype=np.float64), effective_counts
 
     def _compute_factors(self, populations: Floats) -> NDArray[np.float32]:
         """Return factors, shape (c, 2 k + 1), of `_powers` in the logarithm of a candidate's weight."""
@@ -197,13 +197,13 @@ class Evidence:
         return np.asarray(self.candidates.points.mean(axis=0))
 
 
-def estimate_share(share: Floats, effective: ArrayLike) -> Floats:
+def estimate_share(share: Floats, effective_count: ArrayLike) -> Floats:
     """Compute the mean of a share estimated from this many effective blocks."""
-    count = np.asarray(effective)
-    return np.asarray((count * share + _JEFFREYS) / (count + 2.0 * _JEFFREYS))
+    count = np.asarray(effective_count)
+    return np.asarray((count * share + _PRIOR_COUNT) / (count + 2.0 * _PRIOR_COUNT))
 
 
-def with_outliers(probabilities: Floats, outlier_probability: float) -> Floats:
+def include_outliers(probabilities: Floats, outlier_probability: float) -> Floats:
     """Compute probabilities of recorded outcomes from those of the rocking block."""
     return outlier_probability + (1.0 - 2.0 * outlier_probability) * probabilities
 
@@ -213,13 +213,14 @@ RUN_COUNT: Final = 2
 
 #: Equal parts of a run's candidates: two that fill the space, then one for each exponent of the likelihood. The
 #: search continues at most `_MAX_EXTENSIONS` times if runs disagree or too few candidates are effective.
-_FILLING_PARTS: Final = 2
+_FILLING_PART_COUNT: Final = 2
 _ANNEALING_EXPONENTS: Final = (0.03, 0.1, 0.3, 1.0, 1.0)
 _MAX_EXTENSIONS: Final = 2
 
 #: Draws from a posterior, and rounds of moves after each tempering step, for the search and the comparison.
-_PROPOSAL_SIZES: Final = (256, 2)
-_COMPARISON_SIZES: Final = (256, 4)
+_SAMPLE_COUNT: Final = 256
+_PROPOSAL_ROUND_COUNT: Final = 2
+_COMPARISON_ROUND_COUNT: Final = 4
 
 #: Largest R-hat of agreeing runs: their means differ by less than two thirds of a standard deviation.
 MAX_R_HAT: Final = 1.1
@@ -245,8 +246,9 @@ class Problem:
 
     def propose(self, candidates: Candidates, exponent: float, count: int, rng: Generator) -> Candidates:
         """Also simulate blocks near fitted populations, wider for a lower exponent of the likelihood."""
-        populations = sample_posterior(self.evidence(candidates), *_PROPOSAL_SIZES, rng, exponent=exponent)
-        points = draw_points(populations, PROPOSAL_WIDTH, count, rng)
+        evidence, round_count = self.evidence(candidates), _PROPOSAL_ROUND_COUNT
+        populations = sample_posterior(evidence, _SAMPLE_COUNT, round_count, rng, exponent=exponent)
+        points = sample_points(populations, PROPOSAL_WIDTH, count, rng)
         points = points[self.space.contains(points)]
         proposed = Candidates(self.space, points, self.simulate(points), 0, ((count, populations),))
         return Candidates.concatenate([candidates, proposed])
@@ -275,9 +277,9 @@ class SearchResult:
 
 def search(problem: Problem, candidate_count: int, rng: Generator) -> SearchResult:
     """Simulate about this many candidates, up to twice as many while runs disagree or few represent the posterior."""
-    part_size = max(candidate_count // (RUN_COUNT * (_FILLING_PARTS + len(_ANNEALING_EXPONENTS))), 1)
+    part_size = max(candidate_count // (RUN_COUNT * (_FILLING_PART_COUNT + len(_ANNEALING_EXPONENTS))), 1)
     streams = rng.spawn(RUN_COUNT)
-    runs: Sequence[Candidates] = [problem.fill_space(_FILLING_PARTS * part_size, stream) for stream in streams]
+    runs: Sequence[Candidates] = [problem.fill_space(_FILLING_PART_COUNT * part_size, stream) for stream in streams]
     result = _extend_runs(problem, runs, _ANNEALING_EXPONENTS, part_size, streams)
     for _ in range(_MAX_EXTENSIONS):
         if max(result.r_hat.values()) >= MAX_R_HAT:
@@ -303,7 +305,7 @@ def _extend_runs(
         for exponent in exponents:
             run = problem.propose(run, exponent, part_size, rng)
         extended.append(run)
-        posteriors.append(sample_posterior(problem.evidence(run), *_COMPARISON_SIZES, rng))
+        posteriors.append(sample_posterior(problem.evidence(run), _SAMPLE_COUNT, _COMPARISON_ROUND_COUNT, rng))
     return SearchResult(problem.evidence(Candidates.concatenate(extended)), tuple(extended), tuple(posteriors))
 
 
@@ -320,7 +322,9 @@ def compute_r_hat(runs: Floats) -> float:
     return max(compute_from_ranks(values) for values in (runs, np.abs(runs - np.median(runs))))
 
 
-def sample_posterior(evidence: Evidence, count: int, rounds: int, rng: Generator, *, exponent: float = 1.0) -> Floats:
+def sample_posterior(
+    evidence: Evidence, count: int, round_count: int, rng: Generator, *, exponent: float = 1.0
+) -> Floats:
     """Draw populations from the posterior, shape (count, 2 k), or from a tempered one if an exponent is set.
 
     Sequential Monte Carlo (Del Moral, Doucet and Jasra 2006): the centres of the particles start at candidates. Each
@@ -329,9 +333,9 @@ def sample_posterior(evidence: Evidence, count: int, rounds: int, rng: Generator
     """
     space, points = evidence.candidates.space, evidence.candidates.points
     centres = points[rng.choice(len(points), min(4 * count, len(points)), replace=False)]
-    particles = draw_dispersions(space, centres, rng)
-    compute = partial(_compute_log_densities, evidence, exponent)
-    log_densities = compute(particles)
+    particles = extend_to_populations(space, centres, rng)
+    compute_densities = partial(_compute_log_densities, evidence, exponent)
+    log_densities = compute_densities(particles)
     with Progress("fitting", 100) as bar:
         progress = 0.0  # exponent of the ratio of the posterior to the initial distribution
         while progress < 1.0:
@@ -341,8 +345,8 @@ def sample_posterior(evidence: Evidence, count: int, rounds: int, rng: Generator
             progress += increase
             indices = resample(_temper_weights(log_ratio, increase), count, rng)
             particles, log_densities = particles[indices], log_densities[:, indices]
-            for _ in range(rounds):
-                _move_particles(compute, progress, particles, log_densities, rng)
+            for _ in range(round_count):
+                _move_particles(compute_densities, progress, particles, log_densities, rng)
     return particles
 
 
@@ -358,19 +362,19 @@ def _compute_log_densities(evidence: Evidence, exponent: float, populations: Flo
 
 
 def _move_particles(
-    compute: Callable[[Floats], Floats], exponent: float, particles: Floats, log_densities: Floats, rng: Generator
+    evaluate: Callable[[Floats], Floats], exponent: float, particles: Floats, log_densities: Floats, rng: Generator
 ) -> None:
     """Move one half of the particles by differences within the other half, then vice versa."""
     shuffled = rng.permutation(len(particles))
     half = len(particles) // 2
     for movers, guides in ((shuffled[:half], shuffled[half:]), (shuffled[half:], shuffled[:half])):
-        new = particles[movers] + _draw_differences(particles[guides], len(movers), rng)
-        new_densities = compute(new)
+        new = particles[movers] + _sample_differences(particles[guides], len(movers), rng)
+        new_densities = evaluate(new)
         with np.errstate(invalid="ignore"):
             changes = new_densities - log_densities[:, movers]
             gain = (1.0 - exponent) * changes[0] + exponent * changes[1]
         accepted = np.log(rng.random(len(movers))) < gain
-        particles[movers[accepted]], log_densities[:, movers[accepted]] = new[accepted], new_densities[:, accepted]
+        particles[movers[accepted]], log_densities[:, movers[accepted]] = (new[accepted], new_densities[:, accepted])
 
 
 def resample(weights: Floats, count: int, rng: Generator) -> Integers:
@@ -379,13 +383,13 @@ def resample(weights: Floats, count: int, rng: Generator) -> Integers:
     return np.searchsorted(steps / steps[-1], (np.arange(count) + rng.random()) / count).astype(np.int64)
 
 
-def _draw_differences(guides: Floats, count: int, rng: Generator) -> Floats:
+def _sample_differences(guides: Floats, count: int, rng: Generator) -> Floats:
     first, second = (rng.integers(len(guides), size=count) for _ in range(2))
-    size = guides.shape[1]
+    dimension_count = guides.shape[1]
     # 2.38/sqrt(2 d) suits a normal posterior (ter Braak 2006). Whole differences jump between optima.
-    scale = np.where(rng.random(count) < 0.1, 1.0, 2.38 / np.sqrt(2.0 * size))
+    scale = np.where(rng.random(count) < 0.1, 1.0, 2.38 / np.sqrt(2.0 * dimension_count))
     # Jitter lets the moves leave the span of the particles.
-    return scale[:, None] * (guides[first] - guides[second]) + 1e-3 * rng.standard_normal((count, size))
+    return scale[:, None] * (guides[first] - guides[second]) + 1e-3 * rng.standard_normal((count, dimension_count))
 
 
 def _temper_weights(log_ratio: Floats, step: float) -> Floats:

@@ -26,7 +26,7 @@ from rocking.motion.scaling import Measure
 from rocking.records.formats.source import Request
 from rocking.records.named import load_motion, load_vertical, path_exists
 
-_BOOLEANS: Final = {"1": True, "0": False, "true": True, "false": False, "yes": True, "no": False}
+_TRUTH_VALUES: Final = {"1": True, "0": False, "true": True, "false": False, "yes": True, "no": False}
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class _Table:
 
     def booleans(self, column: str) -> tuple[bool, ...]:
         """Return the truth values of a column: 1 or 0, yes or no, true or false."""
-        parse, expected = _BOOLEANS.__getitem__, "0 or 1, no or yes, false or true"
+        parse, expected = _TRUTH_VALUES.__getitem__, "0 or 1, no or yes, false or true"
         return tuple(self.convert(line, row[column].lower(), parse, expected) for line, row in self.rows)
 
     def convert(self, line: int, text: str, parse: Callable[[str], Any], expected: str) -> Any:
@@ -250,15 +250,15 @@ def read_observed(path: Path, measure: Measure, **options: Any) -> dict[str, Any
         raise table.create_error(f"the columns must be {expected}, not {','.join(columns)}")
     has_trials = "trials" in columns
     observed: dict[str, Any] = {
-        "exceeded": table.numbers("overturned") if has_trials else [*table.booleans("overturned")],
-        "trials": table.numbers("trials") if has_trials else 1,
+        "exceedance_counts": table.numbers("overturned") if has_trials else [*table.booleans("overturned")],
+        "trial_counts": table.numbers("trials") if has_trials else 1,
         "clusters": _join_clusters(table, {}) if "group" in columns else None,
     }
     if intensities:
         observed |= _pair_with_intensity(table, intensities[0], measure)
     else:
         observed |= _pair_with_motions(table, measure, **{"channel": None, "dt": None, "units": None, **options})
-    outcomes = round(float(np.sum(np.broadcast_to(observed["trials"], len(table.rows)))))
+    outcomes = round(float(np.sum(np.broadcast_to(observed["trial_counts"], len(table.rows)))))
     return observed | {"description": f"{format_count(outcomes, 'observed outcome')} in {path.name}"}
 
 

@@ -211,7 +211,7 @@ class ModelValidation(Result):
         Mean squared difference between probability and outcome; mean of -log of the outcome's probability.
     reliability : tuple of ReliabilityBin
         Shares that overturned, in the nonempty bins of the predicted probability.
-    reliability_chance : float
+    reliability_p_value : float
         Probability, if the predictions are correct, of a reliability term of the Brier score at least this large.
     description, model : str
         Source of the predictions, and equation of motion.
@@ -236,7 +236,7 @@ class ModelValidation(Result):
     brier: MeanScore
     log_loss: MeanScore
     reliability: tuple[ReliabilityBin, ...]
-    reliability_chance: float
+    reliability_p_value: float
     description: str
     model: str
 
@@ -272,8 +272,8 @@ class ModelValidation(Result):
             [name, *_format_with_error(score.value, score.error), *_format_with_error(score.skill, score.skill_error)]
             for name, score in (("Brier", self.brier), ("log loss", self.log_loss))
         ]
-        negation = "not " if self.reliability_chance < 0.05 else ""
-        reliability = f"{negation}as if the predictions were right (p = {self.reliability_chance:.2g})"
+        negation = "not " if self.reliability_p_value < 0.05 else ""
+        reliability = f"{negation}as if the predictions were right (p = {self.reliability_p_value:.2g})"
         table = format_table(["score", "mean", "+-", "skill", "+-"], scores)
         notes = (f"note: {sentence}" for sentence in self.notes)
         return "\n".join([self._format_headline(), "", table, "", f"reliability: {reliability}", *notes])
@@ -325,7 +325,7 @@ def validate(
     bin_count : int
         Number of bins of the reliability diagram, of equal width.
     simulation_count, seed : int
-        Number of independent draws from the predictions for the bands and `reliability_chance`, and their seed.
+        Number of independent draws from the predictions for the bands and `reliability_p_value`, and their seed.
 
     Returns
     -------
@@ -376,50 +376,50 @@ def validate(
     rng = np.random.default_rng(checks.integer(seed, "seed", OptionError, 0))
     if outlier_probability is not None:
         checks.between(outlier_probability, "outlier_probability", OptionError, 0.0, 0.5)
-    distinct, indices = find_distinct_motions([test.motion for test in items])
+    distinct_motions, indices = find_distinct_motions([test.motion for test in items])
     observed = np.array([test.overturned for test in items], dtype=bool)
     labels = [test.group or k for test, k in zip(items, indices, strict=True)]
     clusters = assign_numbers(labels)
-    description, equation = "predictions of tests that were left out", ""
+    description, model_name = "predictions of tests that were left out", ""
     if isinstance(blocks, Validation):
         probabilities = _average_left_out(blocks, len(items), weights, outlier_probability)
     else:
         if isinstance(blocks, Calibration):
             if weights is not None:
                 raise OptionError("a calibration contains its own {}: omit the argument", "weights")
-            description, equation = f"calibration, {format_count(len(blocks.blocks), 'block')}", model or blocks.model
+            description, model_name = f"calibration, {format_count(len(blocks.blocks), 'block')}", model or blocks.model
             bodies: Bodies = blocks.blocks
-            shares, effective = blocks.weights / blocks.weights.sum(), blocks.diagnostics.effective_count
+            shares, effective_count = blocks.weights / blocks.weights.sum(), blocks.diagnostics.effective_count
             outlier_probability = blocks.outlier_probability if outlier_probability is None else outlier_probability
         else:
-            description, equation = describe_pool(blocks, weights), model or "nonlinear"
+            description, model_name = describe_pool(blocks, weights), model or "nonlinear"
             bodies = gather_bodies(blocks)
             compute_slenderness(bodies)  # checked before the simulations
             shares = normalise_weights(weights, len(bodies)) / len(bodies)
-            effective = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
-        overturned = simulate_outcomes(bodies, distinct, equation)
-        probabilities = compute_probabilities(shares @ overturned, effective, outlier_probability or 0.0)[indices]
+            effective_count = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
+        overturned = simulate_outcomes(bodies, distinct_motions, model_name)
+        probabilities = compute_probabilities(shares @ overturned, effective_count, outlier_probability or 0.0)[indices]
     outcomes = rng.random((simulation_count, len(items))) < probabilities
     bin_indices = np.minimum((probabilities * bin_count).astype(np.int64), bin_count - 1)
-    terms = compute_miscalibration(probabilities, np.vstack([observed, outcomes]), bin_indices)
+    reliability_terms = compute_miscalibration(probabilities, np.vstack([observed, outcomes]), bin_indices)
     # Summation order changes the last digits.
-    larger_count = np.count_nonzero(terms[1:] >= terms[0] - 1e-9 * abs(terms[0]))
+    larger_count = np.count_nonzero(reliability_terms[1:] >= reliability_terms[0] - 1e-9 * abs(reliability_terms[0]))
     rows = zip(make_names_unique([test.name for test in items]), items, probabilities.tolist(), strict=True)
     reliability = []
     for k in np.unique(bin_indices).tolist():
-        in_bin = bin_indices == k
+        is_in_bin = bin_indices == k
         # At most 5 % of the simulated shares are beyond each end.
-        band = np.quantile(outcomes[:, in_bin].mean(axis=1), (0.05, 0.95), method="inverted_cdf").tolist()
-        shares = float(probabilities[in_bin].mean()), float(observed[in_bin].mean())
-        reliability.append(ReliabilityBin(k / bin_count, (k + 1) / bin_count, int(in_bin.sum()), *shares, *band))
+        band = np.quantile(outcomes[:, is_in_bin].mean(axis=1), (0.05, 0.95), method="inverted_cdf").tolist()
+        shares = float(probabilities[is_in_bin].mean()), float(observed[is_in_bin].mean())
+        reliability.append(ReliabilityBin(k / bin_count, (k + 1) / bin_count, int(is_in_bin.sum()), *shares, *band))
     return ModelValidation(
-        tests=tuple(PredictedTest(name, test.motion.name, test.overturned, chance) for name, test, chance in rows),
+        tests=tuple(PredictedTest(name, test.motion.name, test.overturned, value) for name, test, value in rows),
         brier=compute_score((probabilities - observed) ** 2, observed, lambda share: share * (1.0 - share), clusters),
         log_loss=compute_score(compute_log_losses(probabilities, observed), observed, _compute_entropy, clusters),
         reliability=tuple(reliability),
-        reliability_chance=float((1.0 + larger_count) / (simulation_count + 1.0)),
+        reliability_p_value=float((1.0 + larger_count) / (simulation_count + 1.0)),
         description=description,
-        model=equation,
+        model=model_name,
     )
 
 
@@ -470,8 +470,8 @@ def _compute_entropy(share: float) -> float:
 def compute_miscalibration(probabilities: Floats, observed: Flags, bins: Integers) -> Floats:
     """Compute the reliability term of the Brier score (Murphy 1973) of outcomes (s, m) in bins (m,)."""
     counts = np.bincount(bins)
-    member = (bins[:, None] == np.arange(len(counts))).astype(np.float64)
-    excess = (observed - probabilities) @ member
+    membership = (bins[:, None] == np.arange(len(counts))).astype(np.float64)
+    excess = (observed - probabilities) @ membership
     return np.asarray((excess**2 / np.maximum(counts, 1)).sum(axis=1) / len(bins))
 
 

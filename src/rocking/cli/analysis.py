@@ -61,10 +61,10 @@ def spectrum(
     restitution: str | None = None,
     ensemble: Path | None = None,
     fractiles: str = "0.16,0.5,0.84",
-    against: Abscissa = "p",
-    motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
-    model: Annotated[SlipSchemeOptions, MODEL_OPTIONS] = SlipSchemeOptions(),
-    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
+    abscissa: Annotated[Abscissa, Parameter(name="--against")] = "p",
+    motion_options: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
+    model_options: Annotated[SlipSchemeOptions, MODEL_OPTIONS] = SlipSchemeOptions(),
+    output_options: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Compute rocking spectra: peak rotation against the frequency parameter or the size of the block.
 
@@ -87,7 +87,7 @@ def spectrum(
         together, so that their median p equals each of --p (by default half to twice their own).
     fractiles
         Fractions of the motions that stay below the fractile curves.
-    against
+    abscissa
         Abscissa of the figure.
     """
     if alpha is None and ensemble is None:
@@ -95,22 +95,22 @@ def spectrum(
     if ensemble is not None and (alpha is not None or restitution is not None):
         message = "the file of {} contains slendernesses and restitutions: omit {} and {}"
         raise OptionError(message, "ensemble", "alpha", "restitution")
-    with output.folder() as folder:
+    with output_options.folder() as folder:
         axes: dict[str, Any] = {
             "p": None if p is None else read_array(p, "p"),
             "size": None if size is None else read_array(size, "size", read_length),
         }
-        settings = model.create_arguments()
+        settings = model_options.create_arguments()
         if alpha is not None:
             restitutions = None if restitution is None else read_array(restitution, "restitution")
             alphas = read_array(alpha, "alpha", read_tilt)
             settings["blocks"] = Blocks.grid(alpha=alphas, restitution=restitutions, **axes)
         elif ensemble is not None:
-            settings |= axes | read_ensemble_arguments(ensemble, model)
+            settings |= axes | read_ensemble_arguments(ensemble, model_options)
         settings["fractiles"] = read_array(fractiles, "fractiles").tolist()
-        loaded = motion.read_all(names)
+        loaded = motion_options.read_all(names)
         result = rocking_spectrum(motions=[*loaded.motions.values()], **settings)
-        _write_and_print(result, "spectrum", loaded, folder=folder, as_json=output.as_json, against=against)
+        _write_and_print(result, "spectrum", loaded, folder=folder, as_json=output_options.as_json, abscissa=abscissa)
 
 
 def map(
@@ -123,9 +123,9 @@ def map(
     gamma: float | None = None,
     kind: str | None = None,
     rtol: float = 1e-6,
-    block: Annotated[BlockOptions, BLOCK_OPTIONS] = BlockOptions(),
-    model: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
-    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
+    block_options: Annotated[BlockOptions, BLOCK_OPTIONS] = BlockOptions(),
+    model_options: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
+    output_options: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Map the outcomes of a pulse over its amplitude and frequency, with refined boundaries.
 
@@ -155,22 +155,22 @@ def map(
     angle = None if phase is None else read_angle(phase, "phase")
     options = {"cycles": cycles, "phase": angle, "gamma": gamma, "kind": kind}
     parameters: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
-    with output.folder() as folder:
-        slender_block = _create_slender_block(block)
+    with output_options.folder() as folder:
+        block = _create_slender_block(block_options)
         texts = {"amplitudes": amplitudes, "frequencies": frequencies}
         axes: dict[str, Any] = {name: read_array(text, name) for name, text in texts.items()}
-        result = overturning_map(slender_block, pulse, **axes, **model.create_arguments(), rtol=rtol, **parameters)
-        _write_and_print(result, "map", None, folder=folder, as_json=output.as_json)
+        result = overturning_map(block, pulse, **axes, **model_options.create_arguments(), rtol=rtol, **parameters)
+        _write_and_print(result, "map", None, folder=folder, as_json=output_options.as_json)
 
 
 def ida(
     *names: Names,
     rtol: float = 1e-6,
-    measure: Annotated[MeasureOptions, INTENSITY_OPTIONS] = MeasureOptions(),
-    block: Annotated[ObjectOptions, BLOCK_OPTIONS] = ObjectOptions(),
-    motion: Annotated[UnscaledOptions, RECORD_OPTIONS] = UnscaledOptions(),
-    model: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
-    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
+    measure_options: Annotated[MeasureOptions, INTENSITY_OPTIONS] = MeasureOptions(),
+    block_options: Annotated[ObjectOptions, BLOCK_OPTIONS] = ObjectOptions(),
+    motion_options: Annotated[UnscaledOptions, RECORD_OPTIONS] = UnscaledOptions(),
+    model_options: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
+    output_options: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Scale motions up until the block overturns and beyond (incremental dynamic analysis).
 
@@ -184,27 +184,26 @@ def ida(
     rtol
         Width of the refined ends of bands, relative to the level.
     """
-    body = block.create_bodies(labels=("name",))  # all objects have the same friction
-    with output.folder() as folder:
-        loaded = motion.read_all(names)
+    body = block_options.create_bodies(labels=("name",))  # all objects have the same friction
+    with output_options.folder() as folder:
+        loaded = motion_options.read_all(names)
         motions = [*loaded.motions.values()]
-        result = incremental_dynamic_analysis(
-            body, motions, **measure.create_arguments(motion.component), **model.create_arguments(), rtol=rtol
-        )
+        settings = measure_options.create_arguments(motion_options.component) | model_options.create_arguments()
+        result = incremental_dynamic_analysis(body, motions, **settings, rtol=rtol)
         blocks = list_block_names(result.data) if isinstance(body, Sequence) else []
-        _write_and_print(result, "ida", loaded, folder=folder, as_json=output.as_json, blocks=blocks)
+        _write_and_print(result, "ida", loaded, folder=folder, as_json=output_options.as_json, blocks=blocks)
 
 
 def measures(
     *names: Names,
     periods: str = "0.5,1,2",
     damping: float = 0.05,
-    also: str | None = None,
-    clusters: Annotated[ClusterOptions, RISK_OPTIONS] = ClusterOptions(),
-    block: Annotated[EnsembleOptions, BLOCK_OPTIONS] = EnsembleOptions(),
-    motion: Annotated[UnscaledOptions, RECORD_OPTIONS] = UnscaledOptions(),
-    model: Annotated[ModelOptions, MODEL_OPTIONS] = ModelOptions(),
-    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
+    further_measures: Annotated[str | None, Parameter(name="--also")] = None,
+    cluster_options: Annotated[ClusterOptions, RISK_OPTIONS] = ClusterOptions(),
+    block_options: Annotated[EnsembleOptions, BLOCK_OPTIONS] = EnsembleOptions(),
+    motion_options: Annotated[UnscaledOptions, RECORD_OPTIONS] = UnscaledOptions(),
+    model_options: Annotated[ModelOptions, MODEL_OPTIONS] = ModelOptions(),
+    output_options: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Compare intensity measures by the scatter of the intensities at which motions first overturn a block.
 
@@ -218,17 +217,17 @@ def measures(
         Periods of spectral accelerations, s: 0.5,1,2 or 0.2:4:10:log.
     damping
         Fraction of critical damping of the spectral accelerations.
-    also
+    further_measures
         Further measures, separated by commas: pgd, arias, cav, incremental_velocity, duration.
     """
-    settings = block.create_block_arguments(model)
-    with output.folder() as folder:
-        loaded = motion.read_all(names)
-        settings |= {"periods": read_array(periods, "periods"), "clusters": clusters.parse_clusters()}
-        further = [] if also is None else [name.strip() for name in also.split(",")]
-        settings |= {"damping": damping, "component": motion.component, "also": further}
+    settings = block_options.create_block_arguments(model_options)
+    with output_options.folder() as folder:
+        loaded = motion_options.read_all(names)
+        settings |= {"periods": read_array(periods, "periods"), "clusters": cluster_options.parse_clusters()}
+        measure_names = [] if further_measures is None else [name.strip() for name in further_measures.split(",")]
+        settings |= {"damping": damping, "component": motion_options.component, "further_measures": measure_names}
         result = compare_measures(motions=[*loaded.motions.values()], **settings)
-        _write_and_print(result, "measures", loaded, folder=folder, as_json=output.as_json)
+        _write_and_print(result, "measures", loaded, folder=folder, as_json=output_options.as_json)
 
 
 def _write_and_print(
@@ -281,7 +280,7 @@ def chatter(
     order: Annotated[int, READ_INTEGER] = 4,
     impact_count: Annotated[int | None, READ_INTEGER] = None,
     table: Annotated[bool, Parameter(negative="")] = False,
-    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
+    output_options: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Compute how long a slender block chatters under a sine and whether it comes to rest, by every method.
 
@@ -305,7 +304,7 @@ def chatter(
     table
         Show some cycles of the paper's iterative procedure (Eqs 62 and 64). cycles.csv contains all.
     """
-    with output.folder() as folder:
+    with output_options.folder() as folder:
         report = chattering_report(a, omega, eta, order=order, impact_count=impact_count, p=p)
         result, text = report.to_dict(), report.summary()
         if table:
@@ -316,10 +315,12 @@ def chatter(
             if report.cycles is not None:
                 report.to_csv(folder / "cycles.csv", "cycles")
             write_results(folder, figures={"chatter": report.plot}, result=report.to_dict())
-        print_result(result, text, as_json=output.as_json)
+        print_result(result, text, as_json=output_options.as_json)
 
 
-def critical(omega: float, eta: float, *, output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions()) -> None:
+def critical(
+    omega: float, eta: float, *, output_options: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions()
+) -> None:
     """Compute the amplitude up to which chattering under a sine is complete, by every method.
 
     --out contains result.json.
@@ -331,8 +332,8 @@ def critical(omega: float, eta: float, *, output: Annotated[OutputOptions, OUTPU
     eta
         Coefficient of restitution.
     """
-    with output.folder() as folder:
+    with output_options.folder() as folder:
         report = critical_report(omega, eta)
         if folder is not None:
             report.to_json(folder / "result.json")
-        print_result(report.to_dict(), report.summary(), as_json=output.as_json)
+        print_result(report.to_dict(), report.summary(), as_json=output_options.as_json)

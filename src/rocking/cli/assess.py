@@ -6,7 +6,7 @@ import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -31,14 +31,14 @@ from rocking.simulation.ensemble import Polarity
 def assess(
     inventory: Path,
     *names: Names,
-    count: Annotated[int, READ_INTEGER] = 20,
-    samples: Annotated[int, READ_INTEGER] = 50,
+    level_count: Annotated[int, READ_INTEGER, Parameter(name="--count")] = 20,
+    sample_count: Annotated[int, READ_INTEGER, Parameter(name="--samples")] = 50,
     polarity: Annotated[Polarity, Parameter(allow_leading_hyphen=True)] = "both",
-    risk: Annotated[RiskOptions, RISK_OPTIONS] = RiskOptions(),
-    measure: Annotated[MeasureOptions, INTENSITY_OPTIONS] = MeasureOptions(),
-    motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
-    model: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
-    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
+    risk_options: Annotated[RiskOptions, RISK_OPTIONS] = RiskOptions(),
+    measure_options: Annotated[MeasureOptions, INTENSITY_OPTIONS] = MeasureOptions(),
+    motion_options: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
+    model_options: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
+    output_options: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Assess which objects of a table overturn, at which intensity, and how often at a site, in one report.
 
@@ -53,23 +53,24 @@ def assess(
         CSV file or Excel workbook with one object in each row: name, sizes with units in the heading, as Width (cm) and
         Height (m), or p and alpha, or pivots; optionally friction, restraints and standard deviations (24 +- 1). All
         other columns, such as location or value, are listed in the report.
-    count
+    level_count
         Number of levels of each object, if --levels does not set them for all.
-    samples
+    sample_count
         Number of sampled blocks of an object with uncertain sizes.
     polarity
         Motions as they are (+), reversed (-), or both. A symmetric object responds equally to both, which count once.
     """
-    curve = risk.read_hazard(measure, motion.component)
-    settings: dict[str, Any] = measure.create_arguments(motion.component) | model.create_arguments()
-    settings["levels"] = count if settings["levels"] is None else settings["levels"]
+    curve = risk_options.read_hazard(measure_options, motion_options.component)
+    settings = measure_options.create_arguments(motion_options.component) | model_options.create_arguments()
+    settings["levels"] = level_count if settings["levels"] is None else settings["levels"]
     if curve is not None:
         settings["measure"] = curve.measure
-    settings |= {"polarity": polarity, "clusters": risk.parse_clusters(), "confidence": risk.confidence}
-    with output.folder() as folder:
+    settings |= {"polarity": polarity, "clusters": risk_options.parse_clusters(), "confidence": risk_options.confidence}
+    settings |= {"years": risk_options.years}
+    with output_options.folder() as folder:
         objects = read_labelled(inventory, keep_going=True, expected=("name", "friction"))
-        loaded = replace(motion, keep_going=True).read_all(names, accepts_pairs=True)
-        result = assess_objects(objects, loaded.motions, hazard=curve, years=risk.years, samples=samples, **settings)
+        loaded = replace(motion_options, keep_going=True).read_all(names, accepts_pairs=True)
+        result = assess_objects(objects, loaded.motions, hazard=curve, sample_count=sample_count, **settings)
         skipped = {name: reason.removeprefix(name).lstrip(",: ") for name, reason in loaded.skipped.items()}
         result = replace(result, skipped=skipped | {**result.skipped})
         if folder is not None:
@@ -77,4 +78,4 @@ def assess(
             with skip_on_error("assessment.xlsx"):
                 result.to_excel(folder / "assessment.xlsx")
             result.to_netcdf(folder / "assessment.nc")
-        print_result(result.to_dict(), result.summary(), as_json=output.as_json)
+        print_result(result.to_dict(), result.summary(), as_json=output_options.as_json)

@@ -51,8 +51,8 @@ def calibrate(
     motion: str | None = None,
     initial_rotation: str | None = None,
     seed: Annotated[int, READ_INTEGER] = 0,
-    file: Annotated[ScaledPulseOptions, RECORD_OPTIONS] = ScaledPulseOptions(),
-    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
+    file_options: Annotated[ScaledPulseOptions, RECORD_OPTIONS] = ScaledPulseOptions(),
+    output_options: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Estimate the block from observed outcomes (overturned or not) or from a measured rotation history.
 
@@ -96,8 +96,8 @@ def calibrate(
         if text is not None:
             arguments[name] = HOUSNER if text == HOUSNER else read_bounds(text, name, reader)
     rotation = None if initial_rotation is None else read_tilt(initial_rotation, "initial_rotation")
-    with output.folder() as folder:
-        table = read_calibration(data, **file.read_options())
+    with output_options.folder() as folder:
+        table = read_calibration(data, **file_options.read_options())
         conflicting: dict[str, object] = {"motion": motion, "initial_rotation": initial_rotation}
         if isinstance(table, MeasuredHistory):
             conflicting = {
@@ -109,7 +109,7 @@ def calibrate(
             kinds = ("outcomes", "a history") if isinstance(table, MeasuredHistory) else ("a history", "outcomes")
             raise OptionError(f"{{}} requires a table of {kinds[0]}, but this table contains {kinds[1]}", name)
         records = predict if motion is None else (motion,)
-        motions = _read_motions(records, file, "motion" if isinstance(table, MeasuredHistory) else "predict")
+        motions = _read_motions(records, file_options, "motion" if isinstance(table, MeasuredHistory) else "predict")
         if isinstance(table, MeasuredHistory):
             if len(motions) > 1:
                 message = "a history requires a single motion of the base; use {}, or one {}"
@@ -129,13 +129,13 @@ def calibrate(
                 calibration.to_csv(folder / "ensemble.csv")
         if folder is not None:
             write_results(folder, figures={"calibration": result.plot}, result=numbers)
-        print_result(numbers, text, as_json=output.as_json)
+        print_result(numbers, text, as_json=output_options.as_json)
 
 
-def _read_motions(records: Sequence[str], file: ScaledPulseOptions, option: str) -> dict[str, Motion]:
+def _read_motions(records: Sequence[str], file_options: ScaledPulseOptions, option: str) -> dict[str, Motion]:
     """Read records and pulses and reject options of motions if there are none."""
-    motions = {name: file.read_motion(name) for name in records} | file.create_pulses()
-    for name in {} if motions else file.supplied_texts("scale", "pga", "pgv", "sa", "vertical"):
+    motions = {name: file_options.read_motion(name) for name in records} | file_options.create_pulses()
+    for name in {} if motions else file_options.supplied_texts("scale", "pga", "pgv", "sa", "vertical"):
         raise OptionError("{} requires a motion; add one with {} or {}, or omit it", name, option, "pulse")
     return motions
 
@@ -162,10 +162,10 @@ def validate(
     outlier_probability: float | None = None,
     bin_count: Annotated[int, READ_INTEGER] = 10,
     seed: Annotated[int, READ_INTEGER] = 0,
-    block: Annotated[EnsembleOptions, BLOCK_OPTIONS] = EnsembleOptions(),
-    file: Annotated[FileOptions, RECORD_OPTIONS] = FileOptions(),
-    model: Annotated[ModelOptions, MODEL_OPTIONS] = ModelOptions(),
-    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
+    block_options: Annotated[EnsembleOptions, BLOCK_OPTIONS] = EnsembleOptions(),
+    file_options: Annotated[FileOptions, RECORD_OPTIONS] = FileOptions(),
+    model_options: Annotated[ModelOptions, MODEL_OPTIONS] = ModelOptions(),
+    output_options: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Compare the predictions of a block, or of an ensemble from a calibration, with observed outcomes of tests.
 
@@ -184,12 +184,12 @@ def validate(
     seed
         Seed of the simulations for bands and probabilities.
     """
-    with output.folder() as folder:
-        rows = read_tests(tests, **file.read_options())
+    with output_options.folder() as folder:
+        rows = read_tests(tests, **file_options.read_options())
         options: dict[str, Any] = {"outlier_probability": outlier_probability, "bin_count": bin_count, "seed": seed}
-        validation = run_validation(rows, **block.create_block_arguments(model), **options)
+        validation = run_validation(rows, **block_options.create_block_arguments(model_options), **options)
         result = validation.to_dict()
         if folder is not None:
             write_tables(folder, validation)
             write_results(folder, figures={"validation": validation.plot}, result=result)
-        print_result(result, validation.summary(), as_json=output.as_json)
+        print_result(result, validation.summary(), as_json=output_options.as_json)

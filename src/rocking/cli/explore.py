@@ -23,7 +23,7 @@ def explore(
     *,
     port: Annotated[int, READ_INTEGER] = 0,
     no_open: Annotated[bool, Parameter(negative="")] = False,
-    output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
+    output_options: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
     """Open an interactive page that shows how a block rocks, chatters, comes to rest and overturns.
 

@@ -48,12 +48,12 @@ def fragility(
     larger: Annotated[bool, Parameter(negative="")] = False,
     taxonomy: str = "rocking-block",
     standing: float | None = None,
-    risk: Annotated[RiskOptions, RISK_OPTIONS] = RiskOptions(),
-    measure: Annotated[MeasureOptions, INTENSITY_OPTIONS] = MeasureOptions(),
-    block: Annotated[EnsembleOptions, BLOCK_OPTIONS] = EnsembleOptions(),
-    motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
-    model: Annotated[SlipSchemeOptions, MODEL_OPTIONS] = SlipSchemeOptions(),
-    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
+    risk_options: Annotated[RiskOptions, RISK_OPTIONS] = RiskOptions(),
+    measure_options: Annotated[MeasureOptions, INTENSITY_OPTIONS] = MeasureOptions(),
+    block_options: Annotated[EnsembleOptions, BLOCK_OPTIONS] = EnsembleOptions(),
+    motion_options: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
+    model_options: Annotated[SlipSchemeOptions, MODEL_OPTIONS] = SlipSchemeOptions(),
+    output_options: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Fit the probability that a block overturns, or exceeds a rotation, against the intensity of the motions.
 
@@ -83,48 +83,44 @@ def fragility(
     """
     if outcomes is not None:
         conflicting = {
-            "records": names, "levels": measure.levels, "ensemble": block.ensemble, "clusters": risk.clusters,
-            "larger": larger, "limit_states": limit_states != "overturning",
-            "polarity": polarity != "+", "model": model.equation,
-            "chattering": model.chattering != "certified", **block.supplied_texts(),
-            **motion.supplied_texts("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going"),
+            "records": names, "levels": measure_options.levels, "ensemble": block_options.ensemble,
+            "clusters": risk_options.clusters, "larger": larger, "limit_states": limit_states != "overturning",
+            "polarity": polarity != "+", "model": model_options.equation,
+            "chattering": model_options.chattering != "certified", **block_options.supplied_texts(),
+            **motion_options.supplied_texts("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going")
         }  # fmt: skip
         for option in [option for option, value in conflicting.items() if value]:
             message = "{} are observed, for their own block and motions: omit {}"
             raise OptionError(message, "outcomes", option)
-    bodies = {} if outcomes is not None else block.create_block_arguments(model)
-    curve = risk.read_hazard(measure, motion.component)
-    states, intensity_measure = parse_limit_states(limit_states), measure.create_measure(motion.component)
-    if output.out is not None:
+    bodies = {} if outcomes is not None else block_options.create_block_arguments(model_options)
+    curve = risk_options.read_hazard(measure_options, motion_options.component)
+    limits, measure = parse_limit_states(limit_states), measure_options.create_measure(motion_options.component)
+    if output_options.out is not None:
         check_nrml_names("taxonomy", taxonomy)
-        check_nrml_names("a limit state", *states)
+        check_nrml_names("a limit state", *limits)
     if standing is not None:
         checks.positive(standing, "standing", OptionError)
-        standing_limit = _find_standing_limit([*states])
-    with output.folder() as folder:
+        standing_limit = _find_standing_limit([*limits])
+    with output_options.folder() as folder:
         records: dict[str, Any] = {}
         if outcomes is not None:
-            observed = read_observed(outcomes, intensity_measure, **motion.read_options())
-            fitted = fit_fragility(**observed, confidence=risk.confidence)
+            observed = read_observed(outcomes, measure, **motion_options.read_options())
+            fitted = fit_fragility(**observed, confidence=risk_options.confidence)
         else:
-            check_measure(curve, intensity_measure)  # before the simulations
-            loaded = motion.read_all(names)
-            records, settings = loaded.to_dict(), measure.create_arguments(motion.component)
-            settings |= model.create_arguments() | bodies
-            settings |= {
-                "polarity": polarity,
-                "clusters": risk.parse_clusters(),
-                "limit_states": states,
-                "larger": larger,
-            }
+            check_measure(curve, measure)  # before the simulations
+            loaded = motion_options.read_all(names)
+            records, settings = loaded.to_dict(), measure_options.create_arguments(motion_options.component)
+            settings |= model_options.create_arguments() | bodies
+            settings |= {"polarity": polarity, "limit_states": limits, "larger": larger}
+            settings |= {"clusters": risk_options.parse_clusters(), "confidence": risk_options.confidence}
             with _save_outcomes_on_failure(folder):
-                fitted = fit_simulated(motions=[*loaded.motions.values()], **settings, confidence=risk.confidence)
+                fitted = fit_simulated(motions=[*loaded.motions.values()], **settings)
         result, texts = fitted.to_dict() | records, [fitted.summary()]
         figures: dict[str, Callable[[], Figure]] = {"fragility": fitted.plot}
         if curve is not None:
             rates = fitted.annual_rate(curve)
-            result["risk"], figures["risk"] = rates.to_dict(risk.years), rates.plot
-            texts.append(rates.summary(risk.years))
+            result["risk"], figures["risk"] = rates.to_dict(risk_options.years), rates.plot
+            texts.append(rates.summary(risk_options.years))
         if standing is not None:
             survival = fitted.survival(standing, curve, limit_state=standing_limit)
             result["survival"], figures["survival"] = survival.to_dict(), survival.plot
@@ -136,7 +132,7 @@ def fragility(
             if fitted.outcomes is not None:
                 _add_record_names(fitted, result.get("records", [])).to_csv(folder / "outcomes.csv", "outcomes")
             write_results(folder, figures=figures, result=result)
-        print_result(result, "\n\n".join(texts), as_json=output.as_json)
+        print_result(result, "\n\n".join(texts), as_json=output_options.as_json)
 
 
 def _find_standing_limit(names: list[str]) -> str:

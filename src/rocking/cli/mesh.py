@@ -31,7 +31,7 @@ def mesh(
     unit: str = "m",
     turn: _Signed = None,
     restitution: str | None = None,
-    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
+    output_options: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Compute the mass of a body from a mesh, its resistance in every direction, and the equivalent blocks.
 
@@ -62,7 +62,7 @@ def mesh(
     restitution
         Coefficient of restitution, in (0, 1], one or two. By default from conservation of angular momentum.
     """
-    with output.folder() as folder:
+    with output_options.folder() as folder:
         if restitution is not None and azimuth is None:
             message = "{} applies only to blocks created by {}; add such a block, or omit it"
             raise OptionError(message, "restitution", "azimuth")
@@ -91,7 +91,7 @@ def mesh(
 
                 write_csv(folder / "blocks.csv", pd.DataFrame(blocks))
             write_results(folder, figures={"rose": rose.plot}, result=result)
-        print_result(result, "\n\n".join(texts), as_json=output.as_json)
+        print_result(result, "\n\n".join(texts), as_json=output_options.as_json)
 
 
 def _create_block_row(azimuth: float, block: Block) -> dict[str, float]:

@@ -199,30 +199,30 @@ class EnsembleOptions(RestrainedOptions):
     samples: Annotated[int | None, READ_INTEGER, Parameter(help=_SAMPLES_HELP)] = None
     seed: Annotated[int | None, READ_INTEGER, Parameter(help="Seed of the samples, 0 by default.")] = None
 
-    def create_block_arguments(self, model: ModelOptions) -> dict[str, Any]:
+    def create_block_arguments(self, model_options: ModelOptions) -> dict[str, Any]:
         """Return blocks, weights and equation of motion as arguments."""
         if self.ensemble is None:
             values = self.read_uncertain(*declared.BLOCK_INPUTS, "one_sided", "lean")
             if bodies.find_uncertain(values):
-                forces, count = bodies.read_forces(self.supplied_texts()), self.samples or _DEFAULT_SAMPLE_COUNT
-                blocks = bodies.sample_bodies(values, count, self.seed or 0, forces)
-                return {"blocks": blocks, "model": model.model}
+                forces, sample_count = bodies.read_forces(self.supplied_texts()), self.samples or _DEFAULT_SAMPLE_COUNT
+                blocks = bodies.sample_bodies(values, sample_count, self.seed or 0, forces)
+                return {"blocks": blocks, "model": model_options.model}
             for name in self.supplied_texts("samples", "seed"):
                 message = "{} requires an uncertain size or parameter, as in {} '0.30 +- 0.02'"
                 raise OptionError(message, name, "width")
-            return {"blocks": self.create_body(), "model": model.model}
+            return {"blocks": self.create_body(), "model": model_options.model}
         if conflicting := [name for name in self.supplied_texts() if name != "ensemble"]:
             message = f"{{}} replaces the block: omit {join_placeholders(conflicting)}"
             raise BlockError(message, "ensemble", *conflicting)
-        return read_ensemble_arguments(self.ensemble, model)
+        return read_ensemble_arguments(self.ensemble, model_options)
 
 
-def read_ensemble_arguments(file: Path, model: ModelOptions) -> dict[str, Any]:
+def read_ensemble_arguments(file: Path, model_options: ModelOptions) -> dict[str, Any]:
     """Read blocks, weights and equation of motion of an ensemble as arguments."""
     from rocking.calibration.tables import read_ensemble
 
     ensemble = read_ensemble(file)
-    return {"blocks": ensemble.blocks, "weights": ensemble.weights, "model": model.equation or ensemble.model}
+    return {"blocks": ensemble.blocks, "weights": ensemble.weights, "model": model_options.equation or ensemble.model}
 
 
 #: Options of `FileOptions`, by the names of arguments.
@@ -318,7 +318,7 @@ class LoadedRecords(NamedTuple):
 
 
 def read_records(
-    names: Sequence[str], read: Callable[[str], Item], *, keep_going: bool
+    names: Sequence[str], read_record: Callable[[str], Item], *, keep_going: bool
 ) -> tuple[dict[str, Item], dict[str, str]]:
     """Read records one by one; return the motions and, if reading continues after errors, the errors."""
     results: dict[str, Item] = {}
@@ -326,7 +326,7 @@ def read_records(
     with Progress("reading records", total=len(names)) as progress:
         for name in names:
             try:
-                results[name] = read(name)
+                results[name] = read_record(name)
             except (RecordError, MotionError) as error:
                 if not keep_going:
                     raise
@@ -398,8 +398,8 @@ class _RecordOptions(FileOptions):
         with_vertical = "vertical" in self.supplied_texts()
         pairs, skipped = collect_pairs(records, with_vertical=with_vertical, keep_going=self.keep_going, **options)
         motion_names = name_components(pairs) if is_own else list_motion_names(pairs)
-        named = dict(zip(motion_names, pairs, strict=True))
-        horizontals, verticals = separate_verticals(named, keep_going=self.keep_going)
+        named_pairs = dict(zip(motion_names, pairs, strict=True))
+        horizontals, verticals = separate_verticals(named_pairs, keep_going=self.keep_going)
         skipped |= verticals
         note_skipped(skipped)
         motions = {name: self._scale_motion(name, motion, target) for name, motion in horizontals.items()}
@@ -505,7 +505,7 @@ class RiskOptions(ClusterOptions):
     site: Annotated[int, READ_INTEGER, Parameter(help="Row of OpenQuake's file, from 0.")] = 0
     years: Annotated[float, Parameter(help="Time of the probabilities, years.")] = _DEFAULT_YEARS
 
-    def read_hazard(self, measure: IntensityOptions, component: ComponentName) -> HazardCurve | None:
+    def read_hazard(self, measure_options: IntensityOptions, component: ComponentName) -> HazardCurve | None:
         """Check the numbers, and read the hazard curve, if any, with notes."""
         from rocking.analysis.hazard import HazardCurve
 
@@ -516,11 +516,11 @@ class RiskOptions(ClusterOptions):
                 if is_given:
                     raise OptionError("{} requires a hazard curve; add one with {}, or omit it", name, "hazard")
             return None
-        period: Any = measure.periods
-        curve = HazardCurve.read(self.hazard, site=self.site, period=period, component=component)
-        for sentence in list_hazard_notes(curve.intensity, curve.measure):
+        period: Any = measure_options.periods
+        hazard_curve = HazardCurve.read(self.hazard, site=self.site, period=period, component=component)
+        for sentence in list_hazard_notes(hazard_curve.intensity, hazard_curve.measure):
             note(f"{self.hazard}: {sentence}")
-        return curve
+        return hazard_curve
 
 
 @dataclass(frozen=True)

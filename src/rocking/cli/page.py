@@ -16,7 +16,7 @@ def page(
     out: Path = Path("block.html"),
     records: str | None = None,
     class_links: Annotated[Path | None, Parameter("--class")] = None,
-    output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
+    output_options: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
     """Write a page with a rocking block that needs no server and no installation: one HTML file.
 

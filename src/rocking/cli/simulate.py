@@ -75,13 +75,13 @@ class _ResponseOptions(StartOptions):
 
 def simulate(
     *names: Names,
-    each: Annotated[bool, Parameter(negative="")] = False,
-    energy: Annotated[bool, Parameter(negative="")] = False,
-    start: Annotated[_ResponseOptions, MODEL_OPTIONS] = _ResponseOptions(),
-    block: Annotated[ObjectOptions, BLOCK_OPTIONS] = ObjectOptions(),
-    motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
-    model: Annotated[SlipSchemeOptions, MODEL_OPTIONS] = SlipSchemeOptions(),
-    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
+    writes_each: Annotated[bool, Parameter(name="--each", negative="")] = False,
+    draws_energy: Annotated[bool, Parameter(name="--energy", negative="")] = False,
+    start_options: Annotated[_ResponseOptions, MODEL_OPTIONS] = _ResponseOptions(),
+    block_options: Annotated[ObjectOptions, BLOCK_OPTIONS] = ObjectOptions(),
+    motion_options: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
+    model_options: Annotated[SlipSchemeOptions, MODEL_OPTIONS] = SlipSchemeOptions(),
+    output_options: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Simulate a block under a record and describe its response; for several of either, print one line for each pair.
 
@@ -94,28 +94,30 @@ def simulate(
 
     Parameters
     ----------
-    each
+    writes_each
         Also write the files of each of several records into its own folder below --out.
-    energy
+    draws_energy
         Also draw the phase plane (phase-plane.png, .pdf) and the energy against time (energy.png, .pdf) into --out.
     """
-    if start.available_friction is not None:
-        check_available_friction(start.available_friction)  # checked before the simulation
-    choose_factors(start.precision)
-    summary_options: dict[str, Any] = {name: getattr(start, name) for name in ("available_friction", "precision")}
-    body = block.create_bodies()
-    options: dict[str, Any] = {**model.create_arguments(), **start.read_values()}
-    for name in [name for name, is_set in (("each", each), ("energy", energy)) if is_set and output.out is None]:
+    if start_options.available_friction is not None:
+        check_available_friction(start_options.available_friction)  # checked before the simulation
+    choose_factors(start_options.precision)
+    summary_names = "available_friction", "precision"
+    summary_options: dict[str, Any] = {name: getattr(start_options, name) for name in summary_names}
+    body = block_options.create_bodies()
+    options: dict[str, Any] = {**model_options.create_arguments(), **start_options.read_values()}
+    flags = {"each": writes_each, "energy": draws_energy}
+    for name in [name for name, is_set in flags.items() if is_set and output_options.out is None]:
         raise OptionError("{} writes files; set their folder with {}", name, "out")
-    with output.folder() as folder:
-        loaded = motion.read_all(names)
+    with output_options.folder() as folder:
+        loaded = motion_options.read_all(names)
         if loaded.is_single and not isinstance(body, Sequence):
             ((record, base_motion),) = loaded.motions.items()
             response = run_simulation(body, base_motion, **options)
-            result = _write_response(response, record, summary_options, folder, energy)
+            result = _write_response(response, record, summary_options, folder, draws_energy)
             text = response.summary(**summary_options)
         else:
-            if energy and not each:
+            if draws_energy and not writes_each:
                 raise OptionError("{} draws single responses; with several of them also use {}", "energy", "each")
             results = replace(survey(body, loaded.motions, **summary_options, **options), skipped=loaded.skipped)
             if folder is not None:
@@ -123,15 +125,15 @@ def simulate(
                 results.to_json(folder / "summary.json")
                 with skip_on_error("summary.xlsx"):
                     results.to_excel(folder / "summary.xlsx")
-                folders = create_folder_names(results.records, results.responses) if each else []
+                folders = create_folder_names(results.records, results.responses) if writes_each else []
                 for name, record, response in zip(folders, results.records, results.responses, strict=False):
-                    _write_response(response, record, summary_options, create_subfolder(folder, name), energy)
+                    _write_response(response, record, summary_options, create_subfolder(folder, name), draws_energy)
             result, text = results.to_dict(), results.summary()
-        print_result(result, text, as_json=output.as_json)
+        print_result(result, text, as_json=output_options.as_json)
 
 
 def _write_response(
-    response: Response, record: str, summary_options: dict[str, Any], folder: Path | None, energy: bool
+    response: Response, record: str, summary_options: dict[str, Any], folder: Path | None, draws_energy: bool
 ) -> dict[str, Any]:
     """Write the result, figures, histories and events into a folder, if any, and return the result."""
     result = response.to_dict(**summary_options)
@@ -143,7 +145,7 @@ def _write_response(
         response.to_csv(folder / "impacts.csv", "impacts")
         response.to_netcdf(folder / "response.nc")
         figures: dict[str, Callable[[], Any]] = {"response": response.plot}
-        if energy:
+        if draws_energy:
             figures |= {"phase-plane": response.plot_phase_plane, "energy": response.plot_energy}
         write_results(folder, figures=figures, result=result)
     return result
@@ -152,10 +154,10 @@ def _write_response(
 def check(
     *names: Names,
     rules: str | None = None,
-    block: Annotated[FreeObjectOptions, BLOCK_OPTIONS] = FreeObjectOptions(),
-    motion: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
-    model: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
-    output: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
+    block_options: Annotated[FreeObjectOptions, BLOCK_OPTIONS] = FreeObjectOptions(),
+    motion_options: Annotated[MotionOptions, RECORD_OPTIONS] = MotionOptions(),
+    model_options: Annotated[SlipOptions, MODEL_OPTIONS] = SlipOptions(),
+    output_options: Annotated[OutputOptions, OUTPUT_OPTIONS] = OutputOptions(),
 ) -> None:
     """Compare rules of thumb with the simulated response of a block under records.
 
@@ -168,23 +170,23 @@ def check(
     rules
         Some of west,ishiyama,housner,asce_43_05,priestley. By default all.
     """
-    body = block.create_blocks()
+    body = block_options.create_blocks()
     rule_names = None if rules is None else [name.strip() for name in rules.split(",")]
-    with output.folder() as folder:
-        loaded = motion.read_all(names)
-        comparison = compare_rules(body, loaded.motions, rules=rule_names, **model.create_arguments())
+    with output_options.folder() as folder:
+        loaded = motion_options.read_all(names)
+        comparison = compare_rules(body, loaded.motions, rules=rule_names, **model_options.create_arguments())
         comparison = replace(comparison, skipped=loaded.skipped)
         result = comparison.to_dict()
         if folder is not None:
             comparison.to_csv(folder / "check.csv")
             write_results(folder, figures={}, result=result)
-        print_result(result, comparison.summary(), as_json=output.as_json)
+        print_result(result, comparison.summary(), as_json=output_options.as_json)
 
 
 def records(
     *names: Names,
-    file: Annotated[FileOptions, RECORD_OPTIONS] = FileOptions(),
-    output: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions(),
+    file_options: Annotated[FileOptions, RECORD_OPTIONS] = FileOptions(),
+    output_options: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions(),
 ) -> None:
     """List the shipped records, or show the content of record files and how it was interpreted.
 
@@ -192,10 +194,10 @@ def records(
     """
     files = expand_record_names(names)
     is_single = len(files) == 1
-    request = file.create_request(are_defaults=not is_single)
+    request = file_options.create_request(are_defaults=not is_single)
     read = functools.partial(_list_record, request=request)
     listings, messages = read_records(files, read, keep_going=not is_single) if files else ({"": _list_shipped()}, {})
-    if output.as_json:
+    if output_options.as_json:
         entries = [{**facts, "channels" if facts else "records": rows} for facts, rows in listings.values()]
         entries += [{"file": name, "error": message} for name, message in messages.items()]
         print(to_json(entries[0] if len(entries) == 1 else {"files": entries}))
@@ -245,10 +247,10 @@ def _format_listing(facts: dict[str, Any], rows: list[dict[str, Any]]) -> str:
     return title + format_table([*rows[0]], cells)
 
 
-def pulses(*, output: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions()) -> None:
+def pulses(*, output_options: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions()) -> None:
     """List the pulses that --pulse accepts, with their parameters and defaults."""
     families = FAMILIES.values()
-    if output.as_json:
+    if output_options.as_json:
         entries = [{"name": family.name, "needs": family.needed, "takes": family.optional} for family in families]
         for entry, family in zip(entries, families, strict=True):
             entry["units"] = {name: family.unit(name) for name in (*family.needed, *family.optional)}

@@ -42,7 +42,7 @@ WRITERS: Final = {".nc": Study.to_netcdf, ".csv": Study.to_csv, ".parquet": Stud
 
 
 @app.command
-def new(file: Path, *, output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions()) -> None:
+def new(file: Path, *, output_options: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions()) -> None:
     """Write a commented template of a study file.
 
     Parameters
@@ -62,7 +62,7 @@ def create(
     folder: str,
     *,
     blocks_per_batch: Annotated[int | None, READ_INTEGER] = None,
-    output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
+    output_options: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
     """Create the study of a file in a folder; if the folder exists, check that it contains the same study.
 
@@ -82,11 +82,11 @@ def create(
 @app.command
 def run(
     folder: str,
-    into: str | None = None,
+    target: Annotated[str | None, Parameter(name="--into")] = None,
     *,
-    threads: Annotated[int | None, READ_INTEGER] = None,
+    thread_count: Annotated[int | None, READ_INTEGER, Parameter(name="--threads")] = None,
     part: str | None = None,
-    output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
+    output_options: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
     """Compute the missing batches; after Ctrl-C, SIGTERM or any other interruption, run it again to continue.
 
@@ -94,30 +94,30 @@ def run(
     ----------
     folder
         Folder of the study; or its TOML file, from which the study is created first.
-    into
+    target
         With a file, the folder of the study. By default beside the file, with its name without .toml.
-    threads
+    thread_count
         Number of threads, by default one for every core.
     part
         Fixed share of the batches to compute, as 3/10. Shares may run at the same time, as an array of jobs.
     """
-    if into is not None and not folder.endswith(".toml"):
-        raise OptionError(f"{into} is only allowed with a TOML file, which {folder} is not; pass one folder only")
+    if target is not None and not folder.endswith(".toml"):
+        raise OptionError(f"{target} is only allowed with a TOML file, which {folder} is not; pass one folder only")
     is_file = folder.endswith(".toml")
-    study = _create_study(Path(folder), into or folder.removesuffix(".toml"), None) if is_file else Study(folder)
-    with set_options(threads=threads):
+    study = _create_study(Path(folder), target or folder.removesuffix(".toml"), None) if is_file else Study(folder)
+    with set_options(threads=thread_count):
         report = study.run(part=part)
     print(f"{report}\n{study.folder}: {study.status}")
-    for batch, message in [*report.failed.items()][:_MAX_REPORTED]:
+    for batch, message in [*report.failures.items()][:_MAX_REPORTED]:
         note(f"{batch} failed: {message}")
-    if report.failed:
-        raise StudyError(f"{format_count(len(report.failed), 'batch')} failed; run the study again to repeat them")
+    if report.failures:
+        raise StudyError(f"{format_count(len(report.failures), 'batch')} failed; run the study again to repeat them")
     if report.ended_early:
         sys.exit(128 + signal.SIGTERM)
 
 
 @app.command
-def status(folder: str, *, output: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions()) -> None:
+def status(folder: str, *, output_options: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions()) -> None:
     """Show the progress of a study, also while it runs.
 
     Parameters
@@ -126,16 +126,16 @@ def status(folder: str, *, output: Annotated[PrintOptions, OUTPUT_OPTIONS] = Pri
         Folder of the study.
     """
     state = Study(folder).status
-    print_result({"folder": folder, **asdict(state)}, f"{folder}: {state}", as_json=output.as_json)
+    print_result({"folder": folder, **asdict(state)}, f"{folder}: {state}", as_json=output_options.as_json)
 
 
 @app.command
 def verify(
     folder: str,
     *,
-    recompute: Annotated[int, READ_INTEGER] = 0,
+    recompute_count: Annotated[int, READ_INTEGER, Parameter(name="--recompute")] = 0,
     repair: Annotated[bool, Parameter(negative="")] = False,
-    output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
+    output_options: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
     """Read and check every batch, recompute some batches and compare all bits.
 
@@ -143,13 +143,13 @@ def verify(
     ----------
     folder
         Folder of the study.
-    recompute
+    recompute_count
         Number of batches, drawn at random, to compute again.
     repair
         Recompute damaged batches and store them.
     """
     study = Study(folder)
-    faults = study.verify(recompute, repair=repair)
+    faults = study.verify(recompute_count, repair=repair)
     for fault in faults:
         print(fault)
     if faults and not repair:
@@ -164,7 +164,7 @@ def export(
     file: Path,
     *,
     critical: StudyOutcome | None = None,
-    output: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
+    output_options: Annotated[QuietOptions, OUTPUT_OPTIONS] = QuietOptions(),
 ) -> None:
     """Write the results to one file.
 
@@ -191,13 +191,13 @@ def report(
     out: Path | None = None,
     *,
     limit_states: str = "overturning",
-    together: Annotated[bool, Parameter(negative="")] = False,
+    is_pooled: Annotated[bool, Parameter(name="--together", negative="")] = False,
     confidence: float = 0.9,
     fractiles: str = "0.16,0.5,0.84",
     component: ComponentName = "own",
     larger: Annotated[bool, Parameter(negative="")] = False,
-    measure: Annotated[IntensityOptions, INTENSITY_OPTIONS] = IntensityOptions(),
-    output: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions(),
+    measure_options: Annotated[IntensityOptions, INTENSITY_OPTIONS] = IntensityOptions(),
+    output_options: Annotated[PrintOptions, OUTPUT_OPTIONS] = PrintOptions(),
 ) -> None:
     """Fit a fragility curve to the outcomes of each block and compute its spectrum: figures, tables, result.json.
 
@@ -209,7 +209,7 @@ def report(
         Folder for the results. By default the folder report in the folder of the study.
     limit_states
         Limit states, separated by commas: overturning, or NAME=ROTATION divided by the slenderness, as half=0.5.
-    together
+    is_pooled
         Fit one curve to the outcomes of all blocks together.
     confidence
         Probability of the intervals.
@@ -220,22 +220,21 @@ def report(
     larger
         Count only the larger response of both components of each pair, and of both polarities.
     """
-    intensity_measure, limits = measure.create_measure(component), parse_limit_states(limit_states)
-    fractions = check_fractiles(read_array(fractiles, "fractiles").tolist())
+    measure, limits = measure_options.create_measure(component), parse_limit_states(limit_states)
+    fractile_values = check_fractiles(read_array(fractiles, "fractiles").tolist())
     checks.fraction(confidence, "confidence", OptionError)
     study, results = Study(folder), dict[str, Result]()
-    fit = study.fragility if together else study.block_fragilities
-    with open_output_folder(out or Path(folder) / "report", lists_files=not output.as_json) as target:
+    fit = study.fragility if is_pooled else study.block_fragilities
+    with open_output_folder(out or Path(folder) / "report", lists_files=not output_options.as_json) as target:
         with skip_on_error("fragility", FitError):
-            results["fragility"] = fit(
-                measure=intensity_measure, limit_states=limits, confidence=confidence, larger=larger
-            )
-        results["spectrum"] = study.spectrum(fractions.tolist())
+            results["fragility"] = fit(measure=measure, limit_states=limits, confidence=confidence, larger=larger)
+        results["spectrum"] = study.spectrum(fractile_values.tolist())
         for name, analysis in results.items():
             analysis.to_csv(target / f"{name}.csv")
         result = {name: analysis.to_dict() for name, analysis in results.items()}
         write_results(target, figures={name: analysis.plot for name, analysis in results.items()}, result=result)
-        print_result(result, "\n\n".join(analysis.summary() for analysis in results.values()), as_json=output.as_json)
+        text = "\n\n".join(analysis.summary() for analysis in results.values())
+        print_result(result, text, as_json=output_options.as_json)
 
 
 def _create_study(file: Path, folder: str, blocks_per_batch: int | None) -> Study:

@@ -79,8 +79,8 @@ SLIP_VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
 #: Names of coordinates and results that labels of blocks must not replace.
 _RESERVED: Final = {
     *VARIABLES, *TIME_VARIABLES, *SLIP_VARIABLES, "motion", "record", "file", "vertical", "scale", "level", "polarity",
-    "block", "weight", "limit_state", "fractile", "change", "median", "dispersion", "exceeded", "outcomes", "fault",
-    "low", "high", "known",
+    "block", "weight", "limit_state", "fractile", "change", "median", "dispersion", "exceedance_count",
+    "trial_count", "fault", "low", "high", "known"
 }  # fmt: skip
 
 #: Units of parameters of pulses.

@@ -96,23 +96,23 @@ def choose_batch_shape(product: SimulationProduct, blocks_per_batch: int | None)
             message = f"{{}} must be a multiple of {_GROUP_SIZE}, not {width}"
             raise OptionError(message, "blocks_per_batch", value=blocks_per_batch)
         return 1, 1, 1, width
-    motions, scales, polarities, count = product.shape
-    sample = product.bodies.select(np.linspace(0, count - 1, min(count, _GROUP_SIZE)).astype(np.int64))
-    motion = max(product.motions, key=lambda candidate: len(candidate.coefficients))
+    motion_count, scale_count, polarity_count, block_count = product.shape
+    sample = product.bodies.select(np.linspace(0, block_count - 1, min(block_count, _GROUP_SIZE)).astype(np.int64))
+    longest_motion = max(product.motions, key=lambda candidate: len(candidate.coefficients))
     setup = Setup(sample, product.model, product.chattering, product.duration, friction=product.friction)
-    task = Task(slice(None), (motion,), float(product.scales.factors(motion).max()))
+    task = Task(slice(None), (longest_motion,), float(product.scales.factors(longest_motion).max()))
     simulate_task(setup, task)  # loads the kernels
     start = time.perf_counter()
     simulate_task(setup, task)
     seconds = (time.perf_counter() - start) / len(sample)
     # Limits the size from below and above.
-    max_simulations = min(5.0 / seconds, math.prod(product.shape) / 32, _MAX_SIMULATIONS)
-    width = min(_GROUP_SIZE * max(1, int(max_simulations) // _GROUP_SIZE), count)
-    remaining, sizes = max_simulations / width, []
-    for size in (scales, polarities, motions):
-        sizes.append(max(1, min(size, int(remaining))))
-        remaining /= sizes[-1]
-    return sizes[2], sizes[0], sizes[1], width
+    max_simulation_count = min(5.0 / seconds, math.prod(product.shape) / 32, _MAX_SIMULATIONS)
+    width = min(_GROUP_SIZE * max(1, int(max_simulation_count) // _GROUP_SIZE), block_count)
+    remaining, counts = max_simulation_count / width, []
+    for count in (scale_count, polarity_count, motion_count):
+        counts.append(max(1, min(count, int(remaining))))
+        remaining /= counts[-1]
+    return counts[2], counts[0], counts[1], width
 
 
 @functools.cache

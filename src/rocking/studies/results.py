@@ -68,7 +68,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Maximum number of simulations in memory.
-_MAX_IN_MEMORY: Final = 4_000_000
+_MAX_VALUES_IN_MEMORY: Final = 4_000_000
 
 _ALL: Final = slice(None)
 
@@ -80,12 +80,12 @@ StudyOutcome = Literal["overturning", "complete_chattering"]
 
 def open_results(store: Store) -> xr.Dataset:
     """Return the outcomes so far, read lazily; variables are floats, NaN where batches are missing."""
-    done, grid = store.find_done(), store.grid
-    complete = len(done) == len(grid)
-    outcomes: dict[str, Any] = {name: _create_lazy_outcome(store, name, complete) for name in OUTCOMES}
-    if not complete:
+    is_done, grid = store.find_done(), store.grid
+    is_complete = len(is_done) == len(grid)
+    outcomes: dict[str, Any] = {name: _create_lazy_outcome(store, name, is_complete) for name in OUTCOMES}
+    if not is_complete:
         outcomes["done"] = np.zeros(grid.shape, dtype=bool)
-        for key in done:
+        for key in is_done:
             outcomes["done"][grid.ranges(key)] = True
     return _add_records(store, create_dataset(store.product, outcomes))
 
@@ -95,20 +95,20 @@ def _add_records(store: Store, data: xr.Dataset) -> xr.Dataset:
     return data.assign_coords(record=("motion", list(store.records))) if store.records else data
 
 
-def _create_lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
+def _create_lazy_outcome(store: Store, name: str, is_complete: bool) -> xr.Variable:
     import xarray as xr
     from xarray.backends import BackendArray
     from xarray.core import indexing
 
     def read(key: _Selection) -> NDArray[Any]:
-        (values,) = _read_selection(store, [name], complete, key)
-        return values.astype(OUTCOME_DTYPE[name]) if complete else values
+        (values,) = _read_selection(store, [name], is_complete, key)
+        return values.astype(OUTCOME_DTYPE[name]) if is_complete else values
 
     class Outcome(BackendArray):
         """Lazy array that reads the selected batches."""
 
         shape = store.grid.shape
-        dtype = OUTCOME_DTYPE[name] if complete else np.dtype(np.float64)
+        dtype = OUTCOME_DTYPE[name] if is_complete else np.dtype(np.float64)
 
         def __getitem__(self, key: indexing.ExplicitIndexer) -> NDArray[Any]:
             outer = indexing.IndexingSupport.OUTER
@@ -230,17 +230,17 @@ def find_critical_scales(store: Store, outcome: StudyOutcome) -> xr.Dataset:
     return xr.Dataset(variables, coordinates, dataset.attrs | attributes)
 
 
-def _iterate_peak_ratios(store: Store, larger: Measure | None = None) -> Iterator[tuple[slice, Floats]]:
+def _iterate_peak_ratios(store: Store, pair_measure: Measure | None = None) -> Iterator[tuple[slice, Floats]]:
     """Yield normalised peak rotations (motions, scales, polarities, blocks) by slices of blocks.
 
     Values are infinite if the block overturned and NaN if the simulation was abandoned. With a measure, only the larger
     response of each pair and of both polarities is yielded, shape (pairs, scales, 1, blocks).
     """
     store.require_complete()
-    *sizes, count = store.product.shape
+    *other_counts, block_count = store.product.shape
     polarities = slice(0, 1 if store.product.bodies.is_symmetric else None)
     names = ["peak_rotation", "overturned", "unfinished", "ended_early"]
-    for blocks in split_range(count, max(1, _MAX_IN_MEMORY // math.prod(sizes))):
+    for blocks in split_range(block_count, max(1, _MAX_VALUES_IN_MEMORY // math.prod(other_counts))):
         selection = _ALL, _ALL, polarities, blocks
         peak, overturned, unfinished, ended_early = _read_selection(store, names, True, selection)
         if ended_early.any():
@@ -249,9 +249,9 @@ def _iterate_peak_ratios(store: Store, larger: Measure | None = None) -> Iterato
             raise StudyError(f"{count_text} {message} outcomes are unknown: create the study without a duration")
         alpha = compute_slenderness(store.product.bodies.select(blocks))
         ratios = compute_ratios(alpha, peak, overturned != 0.0, unfinished != 0.0)
-        if larger is not None:
+        if pair_measure is not None:
             by_level = ratios.transpose(1, 0, 3, 2)
-            indices = find_larger_responses(by_level, store.product.motions, larger)
+            indices = find_larger_responses(by_level, store.product.motions, pair_measure)
             ratios = by_level.ravel()[indices].swapaxes(0, 1)[:, :, None]
         yield blocks, ratios
 
@@ -341,7 +341,11 @@ class BlockTable(DatasetResult):
             label = f"{100.0 * float(plotted.fractile):g} % fractile of peak rotation over slenderness"
         else:
             measure, names = _parse_measure(self.data.attrs), [str(name) for name in plotted.limit_state.values]
-            panels, missing, label = measure.display_factor * plotted.values, "no curve fits", f"median {measure.label}"
+            panels, missing, label = (
+                measure.display_factor * plotted.values,
+                "no curve fits",
+                f"median {measure.label}",
+            )
 
         def average(name: str) -> Floats:
             keys = [key for key in (name, f"{name}_plus", f"{name}_minus") if key in parameters]
@@ -397,9 +401,9 @@ def compute_spectrum(store: Store, fractiles: Sequence[float]) -> BlockTable:
         for blocks, ratios in _iterate_peak_ratios(store):
             repeated = _mark_repeated(product.bodies.select(blocks), ratios.shape[2])
             missing_count += int(np.count_nonzero(np.isnan(ratios) & ~repeated))
-            distinct = np.where(repeated, np.nan, ratios).swapaxes(1, 2).reshape(-1, scales.count, ratios.shape[3])
-            values[:, :, blocks] = compute_fractiles(distinct, shares)
-            overturned[:, blocks] = compute_overturned_share(distinct)
+            is_distinct = np.where(repeated, np.nan, ratios).swapaxes(1, 2).reshape(-1, scales.count, ratios.shape[3])
+            values[:, :, blocks] = compute_fractiles(is_distinct, shares)
+            overturned[:, blocks] = compute_overturned_share(is_distinct)
             bar.advance(blocks.stop - blocks.start)
     meaning = "peak rotation over the slenderness, infinite where that share overturns"
     variables = {
@@ -434,26 +438,27 @@ def fit_pooled_fragility(
     units, unit_indices = np.unique(compute_block_units(bodies, measure, product.model), return_inverse=True)
     shares = normalise_positive_weights(weights, len(bodies))
     motions = _list_counted_motions(product, measure, larger=larger)
-    scales = product.scales.count
-    trials, missing_count = np.zeros((len(motions), scales, len(units))), 0
-    counts = {name: np.zeros_like(trials) for name in limits}
+    scale_count = product.scales.count
+    trial_counts, missing_count = np.zeros((len(motions), scale_count, len(units))), 0
+    exceedance_counts = {name: np.zeros_like(trial_counts) for name in limits}
     for blocks, ratios in _iterate_peak_ratios(store, measure if larger else None):
         membership = np.where(unit_indices[blocks][:, None] == np.arange(len(units)), shares[blocks][:, None], 0.0)
         is_known = ~np.isnan(ratios)
-        trials += is_known.sum(axis=2, dtype=float) @ membership
+        trial_counts += is_known.sum(axis=2, dtype=float) @ membership
         missing_count += int(np.count_nonzero(~is_known))
         for name, limit in limits.items():
-            counts[name] += compute_exceedances(ratios, limit, name).sum(axis=2) @ membership
-    has_trials = trials > 0.0
+            exceedance_counts[name] += compute_exceedances(ratios, limit, name).sum(axis=2) @ membership
+    has_trials = trial_counts > 0.0
     labels = assign_clusters(product.motions, clusters)[motions]
     intensities = (_compute_intensities(product, measure)[motions][:, :, None] / units)[has_trials]
     groups = np.broadcast_to(labels[:, None, None], has_trials.shape)[has_trials]
     curves = []
     for name, limit in limits.items():
-        data = intensities, counts[name][has_trials], trials[has_trials]
+        data = intensities, exceedance_counts[name][has_trials], trial_counts[has_trials]
         curves.append(fit_curve(name, data, groups, confidence, measure, limit))
-    text = f"{describe_pool(bodies, weights)}, {describe_sample(labels, clusters)}, {format_count(scales, 'scale')}"
-    text += f", {product.model} model{describe_polarities(product.polarity, is_symmetric=bodies.is_symmetric)}"
+    text = f"{describe_pool(bodies, weights)}, {describe_sample(labels, clusters)}"
+    text += f", {format_count(scale_count, 'scale')}, {product.model} model"
+    text += describe_polarities(product.polarity, is_symmetric=bodies.is_symmetric)
     text += ", the larger response" * larger
     return Fragility(
         *(tuple(curves), measure, text, find_single_block(bodies), product.model),
@@ -474,8 +479,8 @@ _CURVE_VARIABLES: Final[Mapping[str, str]] = {
     "dispersion": "standard deviation of the logarithm of the intensity",
     "dispersion_lower": "lower end of its confidence interval",
     "dispersion_upper": "upper end of its confidence interval",
-    "exceeded": "outcomes that exceed the limit",
-    "outcomes": "outcomes that the curve is fitted to",
+    "exceedance_count": "outcomes that exceed the limit",
+    "trial_count": "outcomes that the curve is fitted to",
 }
 
 
@@ -492,19 +497,19 @@ def fit_block_fragilities(
     import xarray as xr
 
     limits = _check_limit_states(limit_states, confidence)
-    product, bodies, scales = store.product, store.product.bodies, store.product.scales.count
+    product, bodies, scale_count = store.product, store.product.bodies, store.product.scales.count
     estimates = {name: np.full((len(limits), len(bodies)), np.nan) for name in _CURVE_VARIABLES}
     faults, missing_count = np.full((len(limits), len(bodies)), "", dtype=object), 0
     motions = _list_counted_motions(product, measure, larger=larger)
     intensities = _compute_intensities(product, measure)[motions].ravel()
     units = compute_block_units(bodies, measure, product.model)
-    labels = np.repeat(assign_clusters(product.motions, clusters)[motions], scales)
+    labels = np.repeat(assign_clusters(product.motions, clusters)[motions], scale_count)
     fit = partial(fit_fragility, measure=measure, confidence=confidence)
     with Progress("fitting", len(bodies) * len(limits)) as bar:
         for blocks, ratios in _iterate_peak_ratios(store, measure if larger else None):
-            repeated = _mark_repeated(bodies.select(blocks), ratios.shape[2])
-            missing_count += int(np.count_nonzero(np.isnan(ratios) & ~repeated))
-            distinct = np.where(repeated, np.nan, ratios)
+            is_repeated = _mark_repeated(bodies.select(blocks), ratios.shape[2])
+            missing_count += int(np.count_nonzero(np.isnan(ratios) & ~is_repeated))
+            distinct = np.where(is_repeated, np.nan, ratios)
             all_trials = np.count_nonzero(~np.isnan(distinct), axis=2).reshape(-1, distinct.shape[3])
             for i, (name, limit) in enumerate(limits.items()):
                 all_exceeded = compute_exceedances(distinct, limit, name).sum(axis=2).reshape(-1, distinct.shape[3])
@@ -515,7 +520,7 @@ def fit_block_fragilities(
                     try:
                         if not has_trials.any():
                             raise FitError("every simulation was abandoned")
-                        curve = fit(*data, trials=trials[has_trials], clusters=labels[has_trials]).curves[0]
+                        curve = fit(*data, trial_counts=trials[has_trials], clusters=labels[has_trials]).curves[0]
                         numbers = [curve.median, *curve.median_interval, curve.dispersion, *curve.dispersion_interval]
                     except FitError as error:  # identical or separated outcomes have no lognormal fit
                         faults[i, j] = str(error)

@@ -102,7 +102,7 @@ class RunReport:
         Number of computed batches and simulations.
     seconds : float
         Duration of the run, s.
-    failed : mapping
+    failures : mapping
         Sentence for each batch that could not be computed, by its name.
     ended_early : bool
         Whether SIGTERM stopped the run before all batches were done.
@@ -124,15 +124,16 @@ class RunReport:
     batch_count: int
     simulation_count: int
     seconds: float
-    failed: dict[str, str]
+    failures: dict[str, str]
     ended_early: bool
 
     def __str__(self) -> str:
         rate = self.simulation_count / self.seconds if self.seconds > 0.0 else 0.0
         done = f"{format_count(self.batch_count, 'batch')}, {format_count(self.simulation_count, 'simulation')}"
         text = f"{done} in {self.seconds:.1f} s ({rate:.3g} a second)"
-        if self.failed:
-            text += f"; {format_count(len(self.failed), 'batch')} failed, the first: {next(iter(self.failed.values()))}"
+        if self.failures:
+            first = next(iter(self.failures.values()))
+            text += f"; {format_count(len(self.failures), 'batch')} failed, the first: {first}"
         return text + ("; stopped, run again to continue" if self.ended_early else "")
 
 
@@ -217,12 +218,12 @@ class Study:
         """
         return open_results(self._store)
 
-    def verify(self, recompute: int = 0, *, repair: bool = False, seed: int = 0) -> list[str]:
+    def verify(self, recompute_count: int = 0, *, repair: bool = False, seed: int = 0) -> list[str]:
         """Read and check every batch, and recompute some batches bit for bit.
 
         Parameters
         ----------
-        recompute : int
+        recompute_count : int
             Number of batches, drawn at random, to compute again.
         repair : bool
             Whether to compute damaged batches again and store them.
@@ -240,10 +241,10 @@ class Study:
             If another version created the study whose batches are to be computed again.
         """
         store, faults = self._store, dict[Key, str]()
-        if checks.integer(recompute, "recompute", OptionError, 0) or repair:
+        if checks.integer(recompute_count, "recompute_count", OptionError, 0) or repair:
             store.check_program()
         done = sorted(store.find_done())
-        recomputed = {*np.random.default_rng(seed).permutation(len(done))[:recompute].tolist()}
+        recomputed = {*np.random.default_rng(seed).permutation(len(done))[:recompute_count].tolist()}
         with Progress("verifying", len(done)) as bar:
             for k, key in enumerate(done):
                 try:
@@ -314,7 +315,7 @@ class Study:
         """Fit a fragility curve to the outcomes of each block, with the arguments and errors of `Study.fragility`.
 
         The result contains, over (limit_state, block), the median and the dispersion with their confidence intervals
-        (median_lower, median_upper, ...; SI units), exceeded and outcomes (counts; for a symmetric block of one
+        (median_lower, median_upper, ...; SI units), exceedance_count and trial_count (for a symmetric block of one
         polarity), and fault: the reason why no lognormal fits, or an empty string.
         """
         parsed = Measure.parse(measure)
@@ -470,21 +471,21 @@ def _parse_part(part: str) -> tuple[int, int]:
 def _run_batches(store: Store, share: Sequence[Key], executor: Any) -> RunReport:
     """Compute the missing batches of a share until SIGTERM."""
     start, grid, pending = time.monotonic(), store.grid, dict[Future[bytes], Key]()
-    batches, simulations, failed = 0, 0, dict[str, str]()
-    done = store.find_done()
-    missing = [key for key in share if key not in done]
-    remaining, total = iter(missing), sum(map(grid.count_simulations, share))
-    done_before = total - sum(map(grid.count_simulations, missing))
+    batch_count, simulation_count, failures = 0, 0, dict[str, str]()
+    done_keys = store.find_done()
+    missing_keys = [key for key in share if key not in done_keys]
+    remaining_keys, total_count = iter(missing_keys), sum(map(grid.count_simulations, share))
+    earlier_count = total_count - sum(map(grid.count_simulations, missing_keys))
     with (
-        Progress("simulations", total, done=done_before) as bar,
-        _open_workers(executor) as (submit, count),
-        _catch_sigterm() as stop,
+        Progress("simulations", total_count, done=earlier_count) as bar,
+        _open_workers(executor) as (submit, count_workers),
+        _catch_sigterm() as stop_event,
     ):
         try:
             while True:
                 # Each worker has a current batch and a next one.
-                capacity = 0 if stop.is_set() else max(2 * max(1, count()) - len(pending), 0)
-                for key in itertools.islice(remaining, capacity):
+                capacity = 0 if stop_event.is_set() else max(2 * max(1, count_workers()) - len(pending), 0)
+                for key in itertools.islice(remaining_keys, capacity):
                     pending[submit(store.create_input(key))] = key
                 if not pending:
                     break
@@ -496,43 +497,43 @@ def _run_batches(store: Store, share: Sequence[Key], executor: Any) -> RunReport
                         raise _create_worker_error(error) from error
                     except Exception as error:
                         prefix = "" if isinstance(error, RockingError) else f"{type(error).__name__}: "
-                        failed[format_key(key)] = " ".join(f"{prefix}{error}".split()).rstrip(": ")
-                        bar.note(f"{format_count(len(failed), 'batch')} failed")
+                        failures[format_key(key)] = " ".join(f"{prefix}{error}".split()).rstrip(": ")
+                        bar.note(f"{format_count(len(failures), 'batch')} failed")
                         continue
                     write_atomically(store.batch_path(key), data)
-                    batches, simulations = batches + 1, simulations + grid.count_simulations(key)
+                    batch_count, simulation_count = batch_count + 1, simulation_count + grid.count_simulations(key)
                     bar.advance(grid.count_simulations(key))
         finally:
             for future in pending:
                 future.cancel()
-    ended_early = stop.is_set() and batches + len(failed) < len(missing)
-    return RunReport(batches, simulations, time.monotonic() - start, failed, ended_early)
+    ended_early = stop_event.is_set() and batch_count + len(failures) < len(missing_keys)
+    return RunReport(batch_count, simulation_count, time.monotonic() - start, failures, ended_early)
 
 
 @contextlib.contextmanager
 def _catch_sigterm() -> Iterator[threading.Event]:
     """Yield an event that SIGTERM sets if this is the main thread."""
-    stop = threading.Event()
+    stop_event = threading.Event()
     if threading.current_thread() is not threading.main_thread():
-        yield stop
+        yield stop_event
         return
-    previous = signal.signal(signal.SIGTERM, lambda *_: stop.set())
+    previous_handler = signal.signal(signal.SIGTERM, lambda *_: stop_event.set())
     try:
-        yield stop
+        yield stop_event
     finally:
-        signal.signal(signal.SIGTERM, previous)
+        signal.signal(signal.SIGTERM, previous_handler)
 
 
 @contextlib.contextmanager
 def _open_workers(executor: Any) -> Iterator[tuple[Callable[[BatchInput], Future[bytes]], Callable[[], int]]]:
     """Yield functions that submit a batch and count the workers; errors stop the threads."""
     if executor is None:
-        cancelled, threads = threading.Event(), ThreadPoolExecutor(choose_thread_count())
+        cancelled, thread_pool = threading.Event(), ThreadPoolExecutor(choose_thread_count())
         try:
-            yield lambda batch_input: threads.submit(compute_batch, batch_input, cancelled), choose_thread_count
+            yield lambda batch_input: thread_pool.submit(compute_batch, batch_input, cancelled), choose_thread_count
         finally:
             cancelled.set()
-            threads.shutdown(cancel_futures=True)
+            thread_pool.shutdown(cancel_futures=True)
         return
     client: Any = executor if hasattr(executor, "get_executor") else getattr(executor, "_client", None)
     pool = executor.get_executor(pure=False) if client is executor else executor
