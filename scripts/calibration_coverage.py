@@ -51,7 +51,7 @@ def outcomes(space: Space, truth: np.ndarray, motions: list[rocking.Motion], rng
     """Simulate a population in its tests: each with its own block inside the bounds, and a few lapses."""
     drawn = np.empty((0, truth.shape[1] // 2))
     while len(drawn) < len(motions):
-        points = population.draw_points(truth, 1.0, len(motions), rng)
+        points = population.sample_points(truth, 1.0, len(motions), rng)
         drawn = np.concatenate([drawn, points[space.contains(points)]])
     blocks = list(space.blocks(drawn[: len(motions)]))
     tested = zip(blocks, motions, strict=True)

@@ -6,7 +6,7 @@ import pytest
 
 from rocking.engine.schemes import chattering_scheme
 from rocking.errors import OptionError
-from rocking.explorer.parameters import PARAMETERS, PULSES, field_label, specification
+from rocking.explorer.parameters import PARAMETERS, PULSES, describe_inputs, find_field_label
 from rocking.explorer.payload import load_english_texts
 from rocking.inputs import quantities
 from rocking.inputs.pulses import FAMILIES, named_pulse
@@ -81,9 +81,9 @@ def test_the_page_reads_every_unit_as_the_program_does():
 
 
 def test_a_field_is_called_by_its_label_and_another_argument_by_its_name():
-    assert field_label("gyration") == "“Radius of gyration”"
-    assert field_label("cycles") == "“Cycles”"
-    assert field_label("tolerances") == "tolerances"
+    assert find_field_label("gyration") == "“Radius of gyration”"
+    assert find_field_label("cycles") == "“Cycles”"
+    assert find_field_label("tolerances") == "tolerances"
 
 
 def test_a_parameter_of_a_pulse_is_called_as_that_pulse_has_it():
@@ -91,12 +91,12 @@ def test_a_parameter_of_a_pulse_is_called_as_that_pulse_has_it():
     for name, pulse in PULSES.items():
         for parameter in pulse["parameters"]:
             assert (
-                field_label(parameter.name, f"{name}:frequency=1")
+                find_field_label(parameter.name, f"{name}:frequency=1")
                 == f"“{load_english_texts()[f'field.{parameter.text}']}”"
             )
             judged += 1
     assert judged >= 20
-    assert field_label("amplitude") == "amplitude"  # of the acceleration, or of the velocity
+    assert find_field_label("amplitude") == "amplitude"  # of the acceleration, or of the velocity
 
 
 def test_what_the_page_shows_where_a_text_names_nothing_is_what_the_package_takes():
@@ -110,7 +110,7 @@ def test_what_the_page_shows_where_a_text_names_nothing_is_what_the_package_take
         for choice, values in pulse.get("choices", {}).items():
             assert values[0] == optional[choice]
             judged += 1
-    limited = [each for each in specification()["treatments"] if "limit" in each]
+    limited = [each for each in describe_inputs()["treatments"] if "limit" in each]
     assert [float(each["unnamed"]) for each in limited] == [
         chattering_scheme(each["name"]).threshold for each in limited
     ]

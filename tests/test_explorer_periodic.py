@@ -12,7 +12,7 @@ from rocking.errors import OptionError
 from rocking.explorer.code import sweep_as_python
 from rocking.explorer.inputs import read_case
 from rocking.explorer.periodic import (
-    RECORDED_PERIODS,
+    RECORDED_PERIOD_COUNT,
     describe_orbit,
     find_sine,
     read_sweep,
@@ -187,12 +187,12 @@ def test_a_sweep_is_what_its_script_computes(texts, asked, tmp_path):
     for (direction, index), each in found.items():
         at = ran.data.sel(direction=direction, start=0).isel(value=index)
         states = np.stack([at.coordinate.values, at.velocity.values], axis=-1)
-        assert at.value == sweep.axis.values[index] and states.shape == (RECORDED_PERIODS, 2)
+        assert at.value == sweep.axis.values[index] and states.shape == (RECORDED_PERIOD_COUNT, 2)
         assert at.period == (each.period if len(each.states) else -1)
         overturned += not len(each.states)
         periodic += each.period > 0
         assert np.isnan(states[-1]).all() == (not len(each.states))
-        assert np.array_equal(states[RECORDED_PERIODS - len(each.states) :], each.states)
+        assert np.array_equal(states[RECORDED_PERIOD_COUNT - len(each.states) :], each.states)
     assert periodic >= 15 and periodic + overturned >= 24
     assert overturned >= 3 or "model" in texts or "scale" in texts
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import rocking
 from rocking.explorer import payload
-from rocking.explorer.parameters import ASSESSMENT_NAMES, MAP_NAMES, PARAMETERS, SWEEP_NAMES, specification
+from rocking.explorer.parameters import ASSESSMENT_NAMES, MAP_NAMES, PARAMETERS, SWEEP_NAMES, describe_inputs
 
 FOLDER = Path(rocking.__file__).parent / "explorer"
 TEXTS = payload.load_english_texts()
@@ -20,7 +20,7 @@ def test_every_text_is_used():
 
 
 def test_every_parameter_has_its_text_and_no_text_is_of_none():
-    described = specification()
+    described = describe_inputs()
     fields = {each.text or each.name for each in PARAMETERS.values()} | {
         *MAP_NAMES,
         *SWEEP_NAMES,

@@ -112,7 +112,7 @@ def outcomes_of(**options):
         y=np.arange(3.0),
         outcome=np.arange(9).reshape(3, 3) % 6,
         meanings=[f"what becomes of the block, number {k}" for k in range(6)],
-        later=np.eye(3, dtype=bool),
+        is_later=np.eye(3, dtype=bool),
         **(
             {
                 "x_label": "amplitude of a lobe over that of the one before it, of which there are five unequal ones",

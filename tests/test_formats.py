@@ -804,7 +804,7 @@ def test_a_missing_file_a_folder_and_an_empty_file(tmp_path: Path, file: Callabl
 
 
 def test_a_file_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch, file: Callable[[str], Path]) -> None:
-    monkeypatch.setattr(source, "SIZE_LIMIT", 2**20)
+    monkeypatch.setattr(source, "MAX_SIZE", 2**20)
     assert "larger than 1 MiB" in complaint(file("1\n" * 2**20))
 
 

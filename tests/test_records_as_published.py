@@ -143,7 +143,7 @@ def test_archives_in_archives_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert expand_record_names([str(path)]) == [f"{path}/inner.zip/inner.zip/inner.zip"]
     path.write_bytes(packed({"a{}.csv": "0\n" * 99, "b.csv": "1"}))
     assert "give one of " in refusal(lambda: read(path)) and "a{}.csv" in refusal(lambda: read(path))
-    monkeypatch.setattr(source, "_MEMBER_LIMIT", 100)
+    monkeypatch.setattr(source, "_MAX_MEMBER_SIZE", 100)
     assert "is larger than 0 MiB; unpack it" in refusal(lambda: read(f"{path}/a{{}}.csv"))
 
 

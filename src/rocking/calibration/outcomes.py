@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from rocking.plot.curves import Parameter
+    from rocking.plot.curves import ParameterEstimate
 
 #: Rounds of moves of draws from the posterior over populations, and draws for a fit without a fold.
 MOVE_ROUND_COUNT: Final = 4
@@ -289,16 +289,16 @@ class Calibration(Result):
             figsize=figsize,
         )
 
-    def _create_parameter(self, name: str) -> Parameter:
+    def _create_parameter(self, name: str) -> ParameterEstimate:
         """Create a parameter for a figure, for both sides if they may differ."""
-        from rocking.plot.curves import Parameter
+        from rocking.plot.curves import ParameterEstimate
 
         estimates = [estimate for key, estimate in self.estimates.items() if key.partition("_")[0] == name]
         values = getattr(self.blocks, name)[:, : len(estimates)]
         ends = np.array([(estimate.median, estimate.lower, estimate.upper) for estimate in estimates])
         space = self._evidence.candidates.space
         low, high = (float(np.exp(end[space.unknown.index(name)])) for end in (space.lower, space.upper))
-        return Parameter({"p": "p (rad/s)", "alpha": "alpha (rad)"}.get(name, name), values, ends, (low, high))
+        return ParameterEstimate({"p": "p (rad/s)", "alpha": "alpha (rad)"}.get(name, name), values, ends, (low, high))
 
     def __repr__(self) -> str:
         return f"<Calibration: {self._format_headline()}; fitted: {self.scores}>"

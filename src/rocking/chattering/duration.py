@@ -42,7 +42,7 @@ from rocking.simulation.simulate import simulate
 _CHUNK_SIZE: Final = 1 << 12
 
 #: Number of impacts in the paper, at this restitution.
-_PAPER_IMPACTS: Final = 60
+_PAPER_IMPACT_COUNT: Final = 60
 _PAPER_RESTITUTION: Final = 0.92
 
 #: Relative rounding error of the bounds of the time of rest (two ulp).
@@ -352,8 +352,8 @@ def _compute_semianalytical_times(a: Floats, omega: Floats, eta: Floats, impact_
 
 def choose_impact_counts(eta: Floats) -> NDArray[np.int64]:
     """Compute the default number of impacts that Eq. 75 resolves."""
-    count = np.ceil(_PAPER_IMPACTS * math.log(_PAPER_RESTITUTION) / np.log(eta))
-    return np.maximum(count, _PAPER_IMPACTS).astype(np.int64)
+    counts = np.ceil(_PAPER_IMPACT_COUNT * math.log(_PAPER_RESTITUTION) / np.log(eta))
+    return np.maximum(counts, _PAPER_IMPACT_COUNT).astype(np.int64)
 
 
 #: Phase before uplift at which the simulated motion starts.

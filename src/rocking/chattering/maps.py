@@ -263,7 +263,7 @@ class ChatteringMap(DatasetResult):
             y=self.data[first].values,
             outcome=self.data.outcome.values,
             meanings=[outcome.label for outcome in UpliftOutcome],
-            later=self._overturns_later(),
+            is_later=self._overturns_later(),
             x_label=axis_labels.get(str(second), str(second)),
             y_label=axis_labels.get(str(first), str(first)),
             title=title or escape_dollars(f"end of the first rocking under {self.data.attrs['case']}"),

@@ -143,8 +143,8 @@ class ChatteringReport(Result):
             return "none"
         return f"{bracket['upper'] - bracket['lower']:.1e} wide, from {format_count(bracket['impacts'], 'impact')}"
 
-    def _format_pair(self, values: dict[str, float], equation: str, *, is_time: bool) -> str:
-        approximate = f"{values[equation]:.9g} by Eq. {equation[2:]}"
+    def _format_pair(self, values: dict[str, float], method: str, *, is_time: bool) -> str:
+        approximate = f"{values[method]:.9g} by Eq. {method[2:]}"
         if math.isnan(values["exact"]):
             return f"none within half a period; {approximate}"
         exact = self._format_time(values["exact"]) if is_time else f"{values['exact']:.9g}"

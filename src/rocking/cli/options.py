@@ -394,7 +394,7 @@ class _RecordOptions(FileOptions):
         target = self._read_target()
         if target is not None and target[1].name != "factor":
             target = target[0], replace(target[1], component=self.component)
-        options = self.read_values("dt", "units", "baseline", "highpass") | {"with_singles": is_own}
+        options = self.read_values("dt", "units", "baseline", "highpass") | {"includes_singles": is_own}
         with_vertical = "vertical" in self.supplied_texts()
         pairs, skipped = collect_pairs(records, with_vertical=with_vertical, keep_going=self.keep_going, **options)
         motion_names = name_components(pairs) if is_own else list_motion_names(pairs)

@@ -34,9 +34,9 @@ def page(
         Text file with links for a class, which the page lists above its tours: in each line words, and at its end the
         address of a case.
     """
-    from rocking.explorer.standalone import RECORDS, build_page
+    from rocking.explorer.standalone import RECORD_NAMES, build_page
 
-    names = RECORDS if records is None else [name.strip() for name in records.split(",") if name.strip()]
+    names = RECORD_NAMES if records is None else [name.strip() for name in records.split(",") if name.strip()]
     text = build_page(names, class_links)
     write_text(out, text)
     print(f"written to {out}: {len(text.encode()) // 1000} kB; open it in a browser")

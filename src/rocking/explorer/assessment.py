@@ -24,7 +24,7 @@ from rocking.motion.scaling import Measure
 from rocking.records.named import make_names_unique
 
 #: Maximum number of levels, and number by default.
-_MAX_LEVELS, _LEVELS = 60, 20
+_MAX_LEVELS, _LEVEL_COUNT = 60, 20
 
 _SCRIPT: Final = """\
 import numpy as np
@@ -76,7 +76,7 @@ def assess_case(case: Case, texts: Texts, uploads: UploadStore) -> AssessedCase:
     block = case.block.with_labels(name="block")
     result = assess(block, motions, measure=measure, levels=levels, polarity="both", **options)
     result = replace(result, skipped={**failures, **result.skipped})
-    return AssessedCase(result, names, _write_script(case, written, measure, levels, options))
+    return AssessedCase(result, names, _format_script(case, written, measure, levels, options))
 
 
 def _read_measure(texts: Texts) -> Measure:
@@ -86,7 +86,7 @@ def _read_measure(texts: Texts) -> Measure:
 
 
 def _read_levels(texts: Texts) -> int | Floats:
-    count = read_count(texts.get("levels") or str(_LEVELS), "levels", 2, _MAX_LEVELS)
+    count = read_count(texts.get("levels") or str(_LEVEL_COUNT), "levels", 2, _MAX_LEVELS)
     if not (texts.get("level_from") or texts.get("level_to")):
         return count
     low, high = (read_acceleration(texts.get(end, ""), end) for end in ("level_from", "level_to"))
@@ -96,7 +96,7 @@ def _read_levels(texts: Texts) -> int | Floats:
     return np.linspace(low, high, count)
 
 
-def _write_script(
+def _format_script(
     case: Case, records: dict[str, WrittenMotion], measure: Measure, levels: int | Floats, options: dict[str, Any]
 ) -> str:
     """Write a complete script that computes the same assessment."""

@@ -13,15 +13,15 @@ from urllib.parse import parse_qsl
 from rocking import records
 from rocking.analysis.levels import assign_numbers
 from rocking.errors import OptionError, RockingError
-from rocking.explorer.parameters import PARAMETERS, Texts, field_label
+from rocking.explorer.parameters import PARAMETERS, Texts, find_field_label
 from rocking.explorer.uploads import UploadStore, compute_measures
 
 #: Maximum number of entries and letters of a list in an address: forty records of two components, and as many again.
 MAX_ENTRIES: Final = 160
-_MAX_LETTERS: Final = 40_000
+_MAX_CHARACTERS: Final = 40_000
 
 #: Names of the texts that control how a file is read.
-_ANSWERS: Final = ("dt", "units", "baseline", "highpass")
+_READING_OPTIONS: Final = ("dt", "units", "baseline", "highpass")
 
 #: Names of components at the end of a file's name or of a channel: azimuths, directions, instrument codes. KiK-net has
 #: one sensor in a borehole, 1, and one at the surface, 2, each with three components.
@@ -38,17 +38,17 @@ class Component(NamedTuple):
     """Component of a record: its row of the list, and the data that it shares with others of its station."""
 
     row: dict[str, Any]
-    place: tuple[object, ...]  # equal for components of one sensor
+    sensor: tuple[object, ...]  # equal for components of one sensor
     origin: tuple[str, ...]  # event and station
-    samples: int = 0
+    sample_count: int = 0
 
     def belongs_to(self, group: list[Component]) -> bool:
         """Whether a component belongs to a group of up to two horizontal ones and a vertical one."""
         first, is_up = group[0], self.row["is_up"]
         labels = [member.row["label"] for member in group if member.row["is_up"] == is_up]
-        is_as_long = abs(self.samples - first.samples) <= 0.01 * max(self.samples, first.samples)
+        is_as_long = abs(self.sample_count - first.sample_count) <= 0.01 * max(self.sample_count, first.sample_count)
         has_room = len(labels) < (1 if is_up else 2) and self.row["label"] not in labels
-        return self.place == first.place and is_as_long and has_room
+        return self.sensor == first.sensor and is_as_long and has_room
 
 
 def read_entries(text: str) -> list[dict[str, str]]:
@@ -60,8 +60,8 @@ def read_entries(text: str) -> list[dict[str, str]]:
     [{'motion': 'ridgecrest-clc-090', 'vertical': 'ridgecrest-clc-up'}, {'motion': 'ridgecrest-clc-360'}]
     """
     parts = [part for part in text.split(";") if part]
-    if len(text) > _MAX_LETTERS or len(parts) > MAX_ENTRIES:
-        message = f"a list of {{}} has {MAX_ENTRIES} entries and {_MAX_LETTERS} letters at most: take some out"
+    if len(text) > _MAX_CHARACTERS or len(parts) > MAX_ENTRIES:
+        message = f"a list of {{}} has {MAX_ENTRIES} entries and {_MAX_CHARACTERS} letters at most: take some out"
         raise OptionError(message, "records")
     return [dict(parse_qsl(part)) for part in parts]
 
@@ -75,7 +75,7 @@ def list_records(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[st
     groups = []
     for group in [*_group_by_station(_list_shipped()), *_group_by_station(components)]:
         rows, first = [component.row for component in group], group[0]
-        title = ", ".join(first.origin) or (rows[0]["file"] if rows[0]["key"] in first.place else str(first.place[0]))
+        title = ", ".join(first.origin) or (rows[0]["file"] if rows[0]["key"] in first.sensor else str(first.sensor[0]))
         reason = " ".join(problems[row["key"]] for row in rows if row["key"] in problems)
         groups.append({"title": title, "reason": reason, "rows": rows})
     return {"groups": groups, "usage": uploads.count_usage()}
@@ -103,7 +103,7 @@ def _list_readable(uploads: UploadStore, key: str, answers: Texts, problems: dic
     except RockingError as error:
         if not answers:
             raise
-        problems[key] = ("" if error.path else f"{uploads.get_file(key).name}: ") + error.text(field_label)
+        problems[key] = ("" if error.path else f"{uploads.get_file(key).name}: ") + error.text(find_field_label)
         known = answers if error.argument in answers else {}
         return _list_readable(uploads, key, {n: text for n, text in known.items() if n != error.argument}, problems)
 
@@ -129,7 +129,7 @@ def _create_row(
 
 def _list_channels(uploads: UploadStore, key: str, answers: Texts) -> list[Component]:
     """Return the channels of a file, read with the user's answers."""
-    options = {name: PARAMETERS[name].read(answers[name]) for name in _ANSWERS if answers.get(name)}
+    options = {name: PARAMETERS[name].read(answers[name]) for name in _READING_OPTIONS if answers.get(name)}
     contents, missing = uploads.describe_file(key, **options), uploads.describe_file(key)["missing"]
     known = {name: answers[name] for name in options if name in missing or name not in ("dt", "units")}
     name, has_many = contents["name"], len(contents["channels"]) > 1
@@ -165,11 +165,11 @@ def _group_by_station(components: Iterable[Component]) -> list[list[Component]]:
     """Group the components of one sensor: up to two horizontal ones, followed by a vertical one."""
     groups: list[list[Component]] = []
     for component in components:
-        home = next((group for group in groups if component.belongs_to(group)), None)
-        if home is None:
+        matching_group = next((group for group in groups if component.belongs_to(group)), None)
+        if matching_group is None:
             groups.append([component])
         else:
-            home.append(component)
+            matching_group.append(component)
     for group in groups:
         group.sort(key=lambda component: component.row["is_up"])
         vertical = group[-1].row

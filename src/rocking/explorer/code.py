@@ -8,7 +8,7 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.explorer.inputs import Case
 from rocking.explorer.maps import Axis, MapGrid, compute_angular_frequency
 from rocking.explorer.parameters import BLOCK_NAMES, PARAMETERS
-from rocking.explorer.periodic import RECORDED_PERIODS, SWEPT, TRANSIENT_PERIODS, Sweep
+from rocking.explorer.periodic import RECORDED_PERIOD_COUNT, SWEPT_INPUTS, TRANSIENT_PERIOD_COUNT, Sweep
 from rocking.inputs.texts import format_command
 
 _CASE_SCRIPT: Final = """\
@@ -132,8 +132,8 @@ def map_as_python(grid: MapGrid) -> str:
         block=case.block_expression,
         x=names[0],
         y=names[1],
-        xs=_write_axis(grid.x),
-        ys=_write_axis(grid.y),
+        xs=_format_axis(grid.x),
+        ys=_format_axis(grid.y),
         changes="".join(f"    {change}\n" for change in changes),
         motion=case.motion_expression + "".join(f".scaled_to({_PEAKS[name]})" for name in names if name in _PEAKS),
         model=case.model,
@@ -146,16 +146,16 @@ def sweep_as_python(sweep: Sweep) -> str:
     options = {name: case.options[name] for name in ("model", "chattering") if name in case.options}
     numbers = {"amplitude": repr(sine.amplitude), "frequency": repr(sine.frequency)}
     return _SWEEP_SCRIPT.format(
-        **numbers | {SWEPT[name]: f"{name} * {sweep.unit!r}"},
+        **numbers | {SWEPT_INPUTS[name]: f"{name} * {sweep.unit!r}"},
         block=case.block_expression,
         phase=sine.phase,
         options="".join(f", {option}={value!r}" for option, value in options.items()),
         name=name,
-        values=_write_axis(sweep.axis),
-        recorded=RECORDED_PERIODS,
-        transient=TRANSIENT_PERIODS,
+        values=_format_axis(sweep.axis),
+        recorded=RECORDED_PERIOD_COUNT,
+        transient=TRANSIENT_PERIOD_COUNT,
     )
 
 
-def _write_axis(axis: Axis) -> str:
+def _format_axis(axis: Axis) -> str:
     return f"np.linspace({float(axis.values[0])!r}, {float(axis.values[-1])!r}, {len(axis.values)})"

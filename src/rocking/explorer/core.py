@@ -17,7 +17,7 @@ from rocking.explorer.catalogue import list_records, read_entries
 from rocking.explorer.code import case_as_command, case_as_python, map_as_python, sweep_as_python
 from rocking.explorer.inputs import Case, read_case
 from rocking.explorer.meshes import describe_body
-from rocking.explorer.parameters import ASSESSMENT_NAMES, PARAMETERS, Texts, specification
+from rocking.explorer.parameters import ASSESSMENT_NAMES, PARAMETERS, Texts, describe_inputs
 from rocking.explorer.payload import Payload
 from rocking.explorer.simulated import SimulatedCase
 from rocking.explorer.standalone import is_available
@@ -153,7 +153,7 @@ class Explorer:
         study = None if self.study is None else self.study.describe()
         axes = [{"name": name, "unit": kind.unit} for name, kind in maps.AXES.items()]
         own = {"axes": axes, "opening": self.opening, "study": study, "block_page": is_available()}
-        return specification() | own | {"record_units": list_units()}
+        return describe_inputs() | own | {"record_units": list_units()}
 
     def _details(self, query: Query) -> Payload:
         """Return what the page shows after a pause: phase plane, ground displacement, body, summary and code."""

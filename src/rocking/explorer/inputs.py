@@ -30,7 +30,7 @@ from rocking.explorer.uploads import UploadStore
 from rocking.inputs.bodies import create_block, find_description, write_block_call
 from rocking.inputs.texts import format_arguments
 from rocking.motion.motion import Motion
-from rocking.motion.piecewise import MAX_ACCELERATION, TOO_STRONG
+from rocking.motion.piecewise import MAX_ACCELERATION, TOO_STRONG_MESSAGE
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
 from rocking.solid.solid import compute_plane
@@ -43,7 +43,7 @@ _MIN_DURATION: Final = 1e-12
 
 
 #: Arguments of `rocking.simulate` besides block and motion.
-_OPTIONS: Final = ("model", "chattering", "duration", "initial_rotation", "initial_velocity", "friction")
+_OPTION_NAMES: Final = ("model", "chattering", "duration", "initial_rotation", "initial_velocity", "friction")
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,13 +102,13 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
         require_rest(side.restitution for side in block.block.sides)
     elif values["duration"] < _MIN_DURATION:
         raise OptionError(f"{{}} must be {_MIN_DURATION:g} s or more here", "duration", value=values["duration"])
-    zero = {name for name in values if name.startswith("initial") and values[name] == 0.0}
-    options: dict[str, Any] = {name: values[name] for name in _OPTIONS if name in values and name not in zero}
+    zeros = {name for name in values if name.startswith("initial") and values[name] == 0.0}
+    options: dict[str, Any] = {name: values[name] for name in _OPTION_NAMES if name in values and name not in zeros}
     chattering_scheme(options.get("chattering", "certified"))  # raises for an unknown scheme
     return Case(case_texts, options, *block, *motion)
 
 
-def require_sticking(case: Case) -> None:
+def reject_friction(case: Case) -> None:
     """Raise `OptionError` if a case has friction, which maps, diagrams and assessments do not support."""
     if "friction" in case.options:
         raise OptionError("{} is simulated for the response alone; leave it empty here", "friction")
@@ -124,10 +124,10 @@ def require_rest(restitutions: Iterable[float]) -> None:
         )
 
 
-def require_possible(peak: float) -> None:
+def check_peak_acceleration(peak: float) -> None:
     """Reject a peak acceleration, m/s^2, that no motion can have, before the motions are created."""
     if peak > MAX_ACCELERATION:
-        raise MotionError(TOO_STRONG)
+        raise MotionError(TOO_STRONG_MESSAGE)
 
 
 def block_to_texts(block: Block) -> dict[str, str]:
@@ -140,8 +140,8 @@ def block_to_texts(block: Block) -> dict[str, str]:
         return texts
     del texts["p"], texts["alpha"]
     sizes = {"width": block.width, "height": block.height} | ({"offset": block.offset} if block.offset else {})
-    same = Block(width=block.width, height=block.height, offset=block.offset, gravity=block.gravity)
-    if block.sides == same.sides:
+    default_block = Block(width=block.width, height=block.height, offset=block.offset, gravity=block.gravity)
+    if block.sides == default_block.sides:
         del texts["restitution"]
     return {name: repr(size) for name, size in sizes.items()} | texts
 

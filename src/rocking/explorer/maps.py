@@ -21,8 +21,8 @@ from rocking.engine.problem import compute_uplift_thresholds
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup, Task, simulate_tasks
 from rocking.errors import OptionError
-from rocking.explorer.inputs import Case, block_to_texts, require_possible, require_rest, require_sticking
-from rocking.explorer.motions import create_pulse, is_pulse, read_pulse_arguments, write_pulse
+from rocking.explorer.inputs import Case, block_to_texts, check_peak_acceleration, reject_friction, require_rest
+from rocking.explorer.motions import create_pulse, format_pulse, is_pulse, read_pulse_arguments
 from rocking.explorer.parameters import BLOCK_NAMES, Texts, list_names, read_count
 from rocking.explorer.payload import Payload
 from rocking.inputs.declared import SCALINGS
@@ -30,7 +30,7 @@ from rocking.inputs.quantities import read_number
 from rocking.motion.motion import Motion
 
 #: Minimum and maximum number of points of an axis, and number by default.
-_MIN_POINTS, _MAX_POINTS, _POINTS = 8, 400, 200
+_MIN_POINTS, _MAX_POINTS, _POINT_COUNT = 8, 400, 200
 
 #: Number of points of a task: of a record, whose points are simulated together, and of another motion.
 _RECORD_POINTS: Final = 256
@@ -100,23 +100,23 @@ def read_grid(case: Case, texts: Texts) -> MapGrid:
     """Read the axes of a map: ``x``, ``x_from``, ``x_to``, the same for ``y``, and the number of ``points`` of each."""
     if case.motion is None or case.motion.pga == 0.0:
         raise OptionError("a map needs something that shakes the block: choose a record or a pulse", "motion")
-    require_sticking(case)
+    reject_friction(case)
     x, y = (_read_axis(direction, case, texts) for direction in ("x", "y"))
     if x.name == y.name or {x.name, y.name} in ({"omega", "p"}, _PEAK_AXES):  # vary the same quantity
         raise OptionError("{} and {} vary the same: choose another pair of axes", x.name, y.name)
     grid = MapGrid(case, case.motion, x, y)
     blocks, factors, _ = _make_blocks(grid, x.values[-1:], y.values[-1:])
     require_rest(blocks.restitution[0])  # the highest comes to rest last
-    require_possible(float(factors[0]) * grid.motion.pga)
+    check_peak_acceleration(float(factors[0]) * grid.motion.pga)
     return grid
 
 
 def _read_axis(direction: str, case: Case, texts: Texts) -> Axis:
-    possible, is_record = list_axes(case), not is_pulse(case.texts.get("motion", ""))
-    name = texts.get(direction) or (("pga" if is_record else "a") if direction == "y" else possible[0])
-    if name not in possible:
+    axis_names, is_record = list_axes(case), not is_pulse(case.texts.get("motion", ""))
+    name = texts.get(direction) or (("pga" if is_record else "a") if direction == "y" else axis_names[0])
+    if name not in axis_names:
         reason = "; the slenderness of a mesh follows from its azimuth, which no map varies" if case.body else ""
-        message = f"{{}}: this case is mapped over {', '.join(possible)}, not over {name[:20]!r}{reason}"
+        message = f"{{}}: this case is mapped over {', '.join(axis_names)}, not over {name[:20]!r}{reason}"
         raise OptionError(message, direction, value=name)
     if direction == "x" and name in _PEAK_AXES:
         raise OptionError("{}: amplitudes go upwards; choose another parameter for the axis to the right", "x")
@@ -134,7 +134,7 @@ def _choose_ends(case: Case, name: str) -> tuple[float, float]:
 def read_range(name: str, texts: Texts, keys: tuple[str, str, str], default_ends: tuple[float, float]) -> Axis:
     """Read the values of a parameter; the texts of the keys are its ends and number of values."""
     low, high = (read_number(texts.get(key) or repr(end), key) for key, end in zip(keys, default_ends, strict=False))
-    count = read_count(texts.get(keys[2]) or str(_POINTS), keys[2], _MIN_POINTS, _MAX_POINTS)
+    count = read_count(texts.get(keys[2]) or str(_POINT_COUNT), keys[2], _MIN_POINTS, _MAX_POINTS)
     if not 0.0 < low < high < math.inf:
         message = f"{{}} must be positive and below {{}}; got {low:g} and {high:g}"
         raise OptionError(message, *keys[:2], value=low)
@@ -293,5 +293,5 @@ def _change_motion(texts: dict[str, str], grid: MapGrid, time_scale: float, peak
     pulse = read_pulse_arguments(name)
     pulse |= {key: pulse[key] * factor for key, factor in (("frequency", 1.0 / time_scale), ("duration", time_scale))
               if key in pulse}  # fmt: skip
-    amplitude = math.copysign(1.0, scale) * pulse["amplitude"] * peak / create_pulse(write_pulse(name, pulse)).pga
-    texts["motion"] = write_pulse(name, pulse | {"amplitude": amplitude})
+    amplitude = math.copysign(1.0, scale) * pulse["amplitude"] * peak / create_pulse(format_pulse(name, pulse)).pga
+    texts["motion"] = format_pulse(name, pulse | {"amplitude": amplitude})

@@ -50,7 +50,7 @@ def read_motion_values(texts: Texts, values: Values, uploads: UploadStore) -> Wr
     if written.motion is None:
         names = [scaling for scaling in SCALINGS if scaling in texts]
         raise OptionError("{} scales a ground motion: choose one, or leave the scaling out", *names)
-    expression = f"{written.expression}.{_write_scaling(*target)}"
+    expression = f"{written.expression}.{_format_scaling(*target)}"
     return written._replace(motion=_scale_motion(written.motion, *target), expression=expression)
 
 
@@ -58,7 +58,7 @@ def _read_level(text: str, name: str) -> float:
     return checks.positive(read_acceleration(text, name), name, OptionError, "m/s^2")
 
 
-def _write_scaling(level: float, measure: Measure) -> str:
+def _format_scaling(level: float, measure: Measure) -> str:
     if measure.name == "factor":
         return f"scaled({level!r})"
     kind = f'rocking.Measure("sa", period={measure.period!r})' if measure.name == "sa" else repr(measure.name)
@@ -151,7 +151,7 @@ def read_pulse_arguments(text: str) -> dict[str, Any]:
     return arguments
 
 
-def write_pulse(text: str, arguments: Mapping[str, Any]) -> str:
+def format_pulse(text: str, arguments: Mapping[str, Any]) -> str:
     """Write a pulse of the family of a text with these parameters, in SI units."""
     return f"{read_pulse(text)[0].name}:" + ",".join(f"{name}={value}" for name, value in arguments.items())
 
@@ -161,12 +161,12 @@ def create_pulse(text: str) -> Motion:
     return read_pulse(text)[0].create_motion(read_pulse_arguments(text))
 
 
-def write_motion_as_pulse(motion: Motion) -> str | None:
+def format_as_pulse(motion: Motion) -> str | None:
     """Return the text of a motion that is one of the pulses, bit for bit and without a vertical component, else None.
 
     Examples
     --------
-    >>> write_motion_as_pulse(create_pulse("one-sine:amplitude=3,frequency=2").scaled(2.0))
+    >>> format_as_pulse(create_pulse("one-sine:amplitude=3,frequency=2").scaled(2.0))
     'one-sine:amplitude=6.0,frequency=2.0'
     """
     name = motion.description.family.lower().replace(" ", "-")
@@ -176,7 +176,7 @@ def write_motion_as_pulse(motion: Motion) -> str | None:
     if name not in PULSES or motion.vertical is not None:
         return None
     names = [*FAMILIES[name].needed, *FAMILIES[name].optional]
-    text = write_pulse(name, {parameter: value for parameter, value in parameters.items() if parameter in names})
+    text = format_pulse(name, {parameter: value for parameter, value in parameters.items() if parameter in names})
     return text if _is_equal(create_pulse(text), motion) else None
 
 
@@ -187,7 +187,7 @@ def _is_equal(motion: Motion, other: Motion) -> bool:
 
 def motion_to_texts(motion: Motion, uploads: UploadStore, factor: float = 1.0) -> dict[str, str]:
     """Texts of a motion times a factor: a pulse, a shipped record, or the key under which the store keeps it."""
-    if (pulse := write_motion_as_pulse(motion if factor == 1.0 else motion.scaled(factor))) is not None:
+    if (pulse := format_as_pulse(motion if factor == 1.0 else motion.scaled(factor))) is not None:
         return {"motion": pulse}
     if motion.name in records.names() and _is_equal(_load_shipped(motion.name), motion):
         return {"motion": motion.name} | ({} if factor == 1.0 else {"scale": repr(factor)})

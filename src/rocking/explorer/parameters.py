@@ -1,7 +1,7 @@
 """Parameters of a case: fields of the page, and possible contents of an address.
 
 `rocking.inputs.declared` declares the inputs of simulations. This module adds the inputs of the page alone, and
-`specification`, from which the page creates its address and forms.
+`describe_inputs`, from which the page creates its address and forms.
 """
 
 from __future__ import annotations
@@ -44,14 +44,14 @@ ASSESSMENT_NAMES: Final = ("records", "measure", "measure_period", "level_from",
 MESH_KINDS: Final = ("obj", "ply", "stl", "glb", "gltf")
 
 #: Units of lengths, angles and accelerations on the page; the first is the default.
-SHOWN_IN: Final[Mapping[str, tuple[str, ...]]] = {
+DISPLAY_UNITS: Final[Mapping[str, tuple[str, ...]]] = {
     "length_in": ("m", "cm", "ft", "in"),
     "angle_in": ("deg", "rad"),
     "acceleration_in": ("g", "m/s2"),
 }
 
 #: Default case: it chatters, rests and rocks on several times.
-DEFAULT: Final = {name: PARAMETERS[name].default for name in ("width", "height", "motion", "pga")}
+DEFAULT_TEXTS: Final = {name: PARAMETERS[name].default for name in ("width", "height", "motion", "pga")}
 
 
 #: Texts of a mesh that are arguments of `rocking.Solid.from_mesh`.
@@ -67,7 +67,7 @@ SHAPES: Final = (
     BlockDescription("mesh", ("mesh", "azimuth"), MESH_OPTIONS[:-1], Solid.block),
 )
 
-_PERIOD: Final = Input("period", "motion", "duration", "", "s", "1", 0.05, 5.0, True)
+_PERIOD_INPUT: Final = Input("period", "motion", "duration", "", "s", "1", 0.05, 5.0, True)
 
 #: Pulses of the page, and choices of a parameter.
 _PULSES: Final = (
@@ -124,14 +124,14 @@ BLOCK_NAMES: Final = list_names("block")
 
 
 def read_texts(texts: Texts) -> tuple[dict[str, str], dict[str, Any]]:
-    """Return the texts of a case that are not empty, by default those of `DEFAULT`, and their values."""
+    """Return the texts of a case that are not empty, by default those of `DEFAULT_TEXTS`, and their values."""
     nonempty = {name: value.strip() for name, value in texts.items() if value.strip()}
     for name, value in nonempty.items():
         if name not in PARAMETERS:
             raise OptionError(f"a case has no {name[:40]!r}; it has {', '.join(PARAMETERS)}")
         if len(value) > _MAX_TEXT_LENGTH:
             raise OptionError(f"{{}} is {len(value)} letters long; at most {_MAX_TEXT_LENGTH} are read", name)
-    nonempty = {"motion": DEFAULT["motion"], **nonempty} if nonempty else DEFAULT
+    nonempty = {"motion": DEFAULT_TEXTS["motion"], **nonempty} if nonempty else DEFAULT_TEXTS
     return nonempty, {name: PARAMETERS[name].read(text) for name, text in nonempty.items()}
 
 
@@ -147,41 +147,41 @@ def read_count(text: str, name: str, minimum: int, maximum: int) -> int:
     return checks.integer(int(number) if number.is_integer() else number, name, OptionError, minimum, maximum)
 
 
-def field_label(name: str, motion: str = "") -> str:
+def find_field_label(name: str, motion: str = "") -> str:
     """Return the label of an argument's field for messages, or the argument itself.
 
     A parameter of a pulse has the label for the pulse in `motion`, or the labels of all pulses that have it.
 
     Examples
     --------
-    >>> field_label("width"), field_label("radius")
+    >>> find_field_label("width"), find_field_label("radius")
     ('“Width”', 'radius')
-    >>> field_label("amplitude", "sine:amplitude=0.2g"), field_label("amplitude", "mavroeidis-papageorgiou")
+    >>> find_field_label("amplitude", "sine:amplitude=0.2g"), find_field_label("amplitude", "mavroeidis-papageorgiou")
     ('“Amplitude”', '“Velocity amplitude”')
     """
-    pulse_in_motion, labels = PULSES.get(motion.partition(":")[0]), load_english_texts()
+    pulse_in_motion, texts = PULSES.get(motion.partition(":")[0]), load_english_texts()
     pulses = PULSES.values() if pulse_in_motion is None else [pulse_in_motion]
     fields = {field.text for pulse in pulses for field in pulse["parameters"] if field.name == name}
-    by_argument = {each.argument: each.name for each in PARAMETERS.values() if each.argument}
-    field = name if f"field.{name}" in labels else by_argument.get(name, "")
-    fields = {field} if f"field.{field}" in labels else fields
-    return f"“{labels[f'field.{fields.pop()}']}”" if len(fields) == 1 else name
+    by_argument = {item.argument: item.name for item in PARAMETERS.values() if item.argument}
+    field = name if f"field.{name}" in texts else by_argument.get(name, "")
+    fields = {field} if f"field.{field}" in texts else fields
+    return f"“{texts[f'field.{fields.pop()}']}”" if len(fields) == 1 else name
 
 
 @functools.cache
-def specification() -> dict[str, Any]:
+def describe_inputs() -> dict[str, Any]:
     """Return these declarations as plain values for the page."""
     return {
         "version": VERSION,
-        "default": DEFAULT,
+        "default": DEFAULT_TEXTS,
         "parameters": [parameter.describe() for parameter in PARAMETERS.values()],
         "map": list(MAP_NAMES),
         "sweep": list(SWEEP_NAMES),
         "assessment": list(ASSESSMENT_NAMES),
-        "shown_in": {name: list(units) for name, units in SHOWN_IN.items()},
+        "shown_in": {name: list(units) for name, units in DISPLAY_UNITS.items()},
         "shapes": [{"name": name, "needed": needed, "optional": optional} for name, needed, optional, _ in SHAPES],
         "scalings": ["", *SCALINGS],
-        "period": _PERIOD.describe(),
+        "period": _PERIOD_INPUT.describe(),
         "pulses": {
             name: {**pulse, "parameters": [parameter.describe() for parameter in pulse["parameters"]]}
             for name, pulse in PULSES.items()

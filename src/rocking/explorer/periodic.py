@@ -16,9 +16,9 @@ from rocking.dynamics.bifurcation import NOT_FOLLOWED, OVERTURNED, BifurcationDi
 from rocking.dynamics.maps import stroboscopic_map
 from rocking.dynamics.orbits import create_orbit
 from rocking.errors import OptionError
-from rocking.explorer.inputs import Case, require_possible, require_sticking
+from rocking.explorer.inputs import Case, check_peak_acceleration, reject_friction
 from rocking.explorer.maps import AXES, Axis, read_range
-from rocking.explorer.motions import create_pulse, read_pulse_arguments, write_pulse
+from rocking.explorer.motions import create_pulse, format_pulse, read_pulse_arguments
 from rocking.explorer.parameters import Texts
 from rocking.explorer.payload import Payload
 from rocking.inputs.declared import SCALINGS
@@ -26,14 +26,14 @@ from rocking.motion.motion import Motion
 from rocking.response.figure import sample_interval
 
 #: Parameters of diagrams, and the parameter of the sine that each varies.
-SWEPT: Final = {"a": "amplitude", "omega": "frequency"}
+SWEPT_INPUTS: Final = {"a": "amplitude", "omega": "frequency"}
 
 #: Transient periods at each value of a diagram, and states recorded after them.
-TRANSIENT_PERIODS: Final = 299
-RECORDED_PERIODS: Final = 64
+TRANSIENT_PERIOD_COUNT: Final = 299
+RECORDED_PERIOD_COUNT: Final = 64
 
 #: The same for a case without a period after those.
-_LONG_TRANSIENT, _MAX_STATES = 7000, 1024
+_LONG_TRANSIENT_COUNT, _MAX_STATES = 7000, 1024
 
 
 class Sine(NamedTuple):
@@ -70,7 +70,7 @@ class Sweep:
         """Compute the diagram upwards and downwards from rest."""
         return bifurcation_diagram(
             lambda value: (self.case.block, self.choose_sine(value).create_period()), values, (0.0, 0.0),
-            direction="both", transient_periods=TRANSIENT_PERIODS, recorded_periods=RECORDED_PERIODS,
+            direction="both", transient_periods=TRANSIENT_PERIOD_COUNT, recorded_periods=RECORDED_PERIOD_COUNT,
             model=self.case.model, chattering=self.case.chattering,
         )  # fmt: skip
 
@@ -95,11 +95,11 @@ def find_sine(case: Case) -> Sine:
 
 def describe_orbit(case: Case) -> Payload:
     """Return the normalised phase plane of a case under its sine without end, and its orbit in words."""
-    require_sticking(case)
+    reject_friction(case)
     sine = find_sine(case)
     strobe = stroboscopic_map(case.block, sine.create_period(), model=case.model, chattering=case.chattering)
     start = tuple(case.options.get(f"initial_{name}", 0.0) for name in ("rotation", "velocity"))
-    for transient, recorded in ((TRANSIENT_PERIODS, RECORDED_PERIODS), (_LONG_TRANSIENT, _MAX_STATES)):
+    for transient, recorded in ((TRANSIENT_PERIOD_COUNT, RECORDED_PERIOD_COUNT), (_LONG_TRANSIENT_COUNT, _MAX_STATES)):
         data = bifurcation_diagram(
             lambda _: (case.block, strobe.motion), [1.0], start, direction="afresh", transient_periods=transient,
             recorded_periods=recorded, model=case.model, chattering=case.chattering,
@@ -122,7 +122,7 @@ def describe_orbit(case: Case) -> Payload:
     header = {
         "sentence": sentence,
         "duration": 1.0 / sine.frequency,
-        "at": {name: getattr(sine, SWEPT[name]) / unit for name, unit in compute_units(case).items()},
+        "at": {name: getattr(sine, SWEPT_INPUTS[name]) / unit for name, unit in compute_units(case).items()},
         "period": max(period, 0),
     }
     is_known = np.isfinite(states[:, 0])
@@ -140,13 +140,13 @@ def normalise_states(case: Case, states: Floats) -> Floats:
 
 def read_sweep(case: Case, texts: Texts) -> Sweep:
     """Read a diagram: ``sweep`` (``a`` or ``omega``), ``sweep_from``, ``sweep_to``, and ``sweep_points``."""
-    require_sticking(case)
+    reject_friction(case)
     sine = find_sine(case)
-    name = checks.choice(texts.get("sweep") or "a", "sweep", OptionError, [*SWEPT])
+    name = checks.choice(texts.get("sweep") or "a", "sweep", OptionError, [*SWEPT_INPUTS])
     omega = sine.frequency / compute_units(case)["omega"]
     ends = (0.9, float(f"{max(1.5, 2.5 * omega):.2g}")) if name == "a" else AXES["omega"][1:]
     sweep = Sweep(case, sine, read_range(name, texts, ("sweep_from", "sweep_to", "sweep_points"), ends))
-    require_possible(sweep.choose_sine(float(sweep.axis.values[-1])).amplitude)
+    check_peak_acceleration(sweep.choose_sine(float(sweep.axis.values[-1])).amplitude)
     return sweep
 
 
@@ -158,34 +158,34 @@ def simulate_sweep(sweep: Sweep) -> Generator[Payload]:
         share += 8.0 / stride / 15.0
         states = np.stack([data.coordinate.values, data.velocity.values], axis=-1)
         for d, direction in enumerate(data.direction.values.tolist()):
-            periods, impacts = data.period.values[d].tolist(), data.impact_count.values[d].tolist()
-            counts = [0 if period < 0 else period or RECORDED_PERIODS for period in periods]
-            kept = np.concatenate([states[d, k, RECORDED_PERIODS - count :] for k, count in enumerate(counts)])
+            periods, impact_counts = data.period.values[d].tolist(), data.impact_count.values[d].tolist()
+            counts = [0 if period < 0 else period or RECORDED_PERIOD_COUNT for period in periods]
+            kept = np.concatenate([states[d, k, RECORDED_PERIOD_COUNT - count :] for k, count in enumerate(counts)])
             header = {
                 "stride": stride,
                 "share": share - (d == 0) * 4.0 / stride / 15.0,
                 "direction": direction,
                 "indices": [*range(0, len(values), stride)],
                 "counts": counts,
-                "words": [_describe_period(*pair) for pair in zip(periods, impacts, strict=True)],
+                "words": [_describe_period(*pair) for pair in zip(periods, impact_counts, strict=True)],
                 "overturned": [period == OVERTURNED for period in periods],
             }
             yield Payload(header, {"states": kept.ravel(), "drawn": normalise_states(sweep.case, kept)[:, 0]})
 
 
-def _describe_period(period: int, impacts: float) -> str:
+def _describe_period(period: int, impact_count: float) -> str:
     if period <= 0:
         return {OVERTURNED: "overturns", NOT_FOLLOWED: "requires too many steps", 0: "no period found"}[period]
-    if not impacts:
+    if not impact_count:
         return "stays at rest"
-    return f"period {period}, with complete chattering" if math.isinf(impacts) else f"period {period}"
+    return f"period {period}, with complete chattering" if math.isinf(impact_count) else f"period {period}"
 
 
 def sweep_point_to_texts(sweep: Sweep, value: float, state: Sequence[float] = ()) -> dict[str, str]:
     """Return the texts of the case at a value of the parameter, from a state (or from rest)."""
     dropped = {*SCALINGS, "initial_rotation", "initial_velocity"}
     texts = {name: text for name, text in sweep.case.texts.items() if name not in dropped}
-    texts["motion"] = write_pulse("sine", sweep.choose_sine(value)._asdict())
+    texts["motion"] = format_pulse("sine", sweep.choose_sine(value)._asdict())
     if len(state):
         texts |= {"initial_rotation": repr(state[0]), "initial_velocity": repr(state[1])}
     return texts

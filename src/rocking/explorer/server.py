@@ -22,10 +22,10 @@ from starlette.staticfiles import StaticFiles
 from rocking.core.tables import to_plain
 from rocking.errors import RockingError
 from rocking.explorer.core import Explorer, Query, Stream
-from rocking.explorer.parameters import field_label
+from rocking.explorer.parameters import find_field_label
 from rocking.explorer.payload import Payload, fill_page, load_english_texts, pack
 from rocking.explorer.standalone import build_page
-from rocking.explorer.uploads import MAX_FILE_SIZE, TOO_LARGE
+from rocking.explorer.uploads import MAX_FILE_SIZE, SIZE_ADVICE
 
 #: Path that exchanges the token of a link for the secret.
 EXCHANGE: Final = "/api/secret"
@@ -33,7 +33,7 @@ EXCHANGE: Final = "/api/secret"
 #: Maximum number of unopened links.
 _MAX_LINKS: Final = 100
 
-_BINARY: Final = "application/octet-stream"
+_BINARY_TYPE: Final = "application/octet-stream"
 
 #: Policies of both pages.
 _BLOCK_POLICY: Final = "frame-ancestors 'none'"
@@ -107,9 +107,9 @@ class App:
             if isinstance(answer, Stream):
                 parts = _encode_parts(answer, request.query_params.get("motion", ""))
                 close = BackgroundTask(answer.parts.close)  # also when the reader disconnects
-                return StreamingResponse(parts, media_type=_BINARY, background=close)
+                return StreamingResponse(parts, media_type=_BINARY_TYPE, background=close)
             if isinstance(answer, Payload | bytes):
-                return Response(answer if isinstance(answer, bytes) else pack(answer), media_type=_BINARY)
+                return Response(answer if isinstance(answer, bytes) else pack(answer), media_type=_BINARY_TYPE)
             return JSONResponse(to_plain(answer))
 
         return respond
@@ -120,12 +120,12 @@ class App:
             return _respond_problem(_LINK_REQUIRED, 403)
         data = bytearray()
         if int(request.headers.get("content-length", 0)) > MAX_FILE_SIZE:  # a number: uvicorn accepts nothing else
-            return _respond_problem(TOO_LARGE, 413)
+            return _respond_problem(SIZE_ADVICE, 413)
         try:
             async for chunk in request.stream():
                 data += chunk
                 if len(data) > MAX_FILE_SIZE:
-                    return _respond_problem(TOO_LARGE, 413)
+                    return _respond_problem(SIZE_ADVICE, 413)
         except ClientDisconnect:
             return Response(status_code=400)
         name = request.query_params.get("name", "")
@@ -167,7 +167,7 @@ def _encode_parts(stream: Stream, motion: str) -> Iterator[bytes]:
 
 def _describe_error(error: RockingError, motion: str) -> dict[str, Any]:
     """Return the message of an error, with the page's names of the fields, and the argument."""
-    return {"problem": error.text(lambda name: field_label(name, motion)), "argument": error.argument}
+    return {"problem": error.text(lambda name: find_field_label(name, motion)), "argument": error.argument}
 
 
 def _respond_problem(problem: str, status: int) -> Response:

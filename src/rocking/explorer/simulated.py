@@ -35,7 +35,7 @@ _MIN_WINDOW: Final = 1e-12
 _MAX_MARKS: Final = 2_000
 
 #: Treatment with a narrow bracket on times of rest, s, to resolve impacts in windows close to a rest.
-_REFINED: Final = Certified(1e-40)
+_REFINED_SCHEME: Final = Certified(1e-40)
 
 #: Longest drawn period of ground motion, s, for records whose baseline would drift.
 MAX_DRAWN_PERIOD: Final = 10.0
@@ -57,9 +57,9 @@ class SimulatedCase:
     @functools.cached_property
     def refined(self) -> Response:
         """Same response with more impacts resolved before each proven rest."""
-        if self.case.chattering.name != _REFINED.name:
+        if self.case.chattering.name != _REFINED_SCHEME.name:
             return self.response
-        refined = self.case.simulate(chattering=_REFINED)
+        refined = self.case.simulate(chattering=_REFINED_SCHEME)
         return refined if refined.rests_by_rounding == self.response.rests_by_rounding else self.response
 
     def resolve_window(self, window: tuple[float, float] | None) -> tuple[Response, float, float]:
@@ -89,16 +89,16 @@ def find_unresolved(response: Response, start: float, end: float) -> list[float]
 
 def has_drift(motion: Motion) -> bool:
     """Whether a motion has the displacement of a record, which can be filtered."""
-    long_enough = motion.dt is not None and motion.duration > 2.0 * MAX_DRAWN_PERIOD > 20.0 * motion.dt
-    return long_enough and motion.coefficients.shape[1] == 2 and not motion.has_jumps
+    is_long_enough = motion.dt is not None and motion.duration > 2.0 * MAX_DRAWN_PERIOD > 20.0 * motion.dt
+    return is_long_enough and motion.coefficients.shape[1] == 2 and not motion.has_jumps
 
 
-def describe_case(shown: SimulatedCase, window: tuple[float, float] | None) -> Payload:
+def describe_case(simulated_case: SimulatedCase, window: tuple[float, float] | None) -> Payload:
     """Return the numbers of a case on the page, the sentence above them, and its lines in a window (s)."""
-    case, response = shown.case, shown.response
+    case, response = simulated_case.case, simulated_case.response
     block, motion = case.block, case.motion
-    visible, start, end = shown.resolve_window(window)
-    marks = visible.impacts["time"][(visible.impacts["time"] >= start) & (visible.impacts["time"] <= end)]
+    resolved, start, end = simulated_case.resolve_window(window)
+    impact_times = resolved.impacts["time"][(resolved.impacts["time"] >= start) & (resolved.impacts["time"] <= end)]
     share = chattering_episodes(response).share_at_rest
     outline = None if case.body is None else case.body.find_outline(case.azimuth)
     header = {
@@ -120,11 +120,11 @@ def describe_case(shown: SimulatedCase, window: tuple[float, float] | None) -> P
         "share_at_rest": 0.0 if share < _MIN_SHARE else share,
         "verdict": describe_outcome(response),
         "window": {
-            "from": start, "to": end if end > start else start + 1.0, "impacts": len(marks),
+            "from": start, "to": end if end > start else start + 1.0, "impacts": len(impact_times),
             "unresolved": max(find_unresolved(response, start, end), default=None),
         },
     }  # fmt: skip
-    arrays = {**_sample_window(case, visible, start, end, marks), **sample_events(response)}
+    arrays = {**_sample_window(case, resolved, start, end, impact_times), **sample_events(response)}
     return Payload(header, arrays | ({} if outline is None else {"outline": outline.ravel()}))
 
 
@@ -142,39 +142,39 @@ def describe_outcome(response: Response) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def describe_details(shown: SimulatedCase, window: tuple[float, float] | None) -> Payload:
+def describe_details(simulated_case: SimulatedCase, window: tuple[float, float] | None) -> Payload:
     """Return the phase plane, the energy and the ground displacement in a window (s); times count from its start."""
-    response, start, end = shown.resolve_window(window)
+    response, start, end = simulated_case.resolve_window(window)
     course = sample_interval(response, start, end)
     x, y = compute_boundary(response)
     times = np.linspace(start, end, MAX_POINTS // 4)
-    ground = None if shown.case.motion is None else shown.case.motion.with_vertical(None)
+    ground = None if simulated_case.case.motion is None else simulated_case.case.motion.with_vertical(None)
     if ground is not None and has_drift(ground):
         ground = ground.processed(baseline=1, band_pass=(1.0 / MAX_DRAWN_PERIOD, None))
-    moved = np.zeros_like(times) if ground is None else ground.displacement(np.minimum(times, ground.duration))
+    displacements = np.zeros_like(times) if ground is None else ground.displacement(np.minimum(times, ground.duration))
     arrays = {
         "course_time": course.time - start, "course_rotation": course.rotation, "course_velocity": course.velocity,
         "kinetic": course.kinetic, "potential": course.potential, "jump": course.impact_rows.astype(float),
-        "boundary_x": x, "boundary_y": y, "displacement_time": times - start, "displacement": moved,
-        **{f"course_{kind}": found - start for kind, found in find_event_times(response, start, end).items()},
+        "boundary_x": x, "boundary_y": y, "displacement_time": times - start, "displacement": displacements,
+        **{f"course_{kind}": instants - start for kind, instants in find_event_times(response, start, end).items()}
     }  # fmt: skip
     return Payload({"from": start, "needed": response._energy.overturning_energy.tolist()}, arrays)
 
 
-def find_state(shown: SimulatedCase, time: str, window: tuple[float, float] | None) -> dict[str, Any]:
+def find_state(simulated_case: SimulatedCase, time: str, window: tuple[float, float] | None) -> dict[str, Any]:
     """Return the state at a time (text), in the response of a window (s)."""
-    value, duration = read_duration(time, "at"), shown.response.duration
+    value, duration = read_duration(time, "at"), simulated_case.response.duration
     if not 0.0 <= value <= duration:
         message = f"{{}} must be within the response, from 0 to {duration:.6g} s, not {value:g} s"
         raise OptionError(message, "at", value=time)
-    response, *_ = shown.resolve_window(window)
+    response, *_ = simulated_case.resolve_window(window)
     rotation, velocity, _ = response.states(value).tolist()
-    motion = shown.case.motion
+    motion = simulated_case.case.motion
     components = {"ground_g": motion, "vertical_g": None if motion is None else motion.vertical}
     return {
         "time": value,
         "rotation": rotation,
-        "over_slenderness": rotation / shown.case.block.sides[0 if rotation >= 0.0 else 1].alpha,
+        "over_slenderness": rotation / simulated_case.case.block.sides[0 if rotation >= 0.0 else 1].alpha,
         "velocity": velocity,
         "energy": float(response.kinetic_energy(value) + response.potential_energy(value)),
         "slip": float(response.slip(value)) if response.friction is not None else None,

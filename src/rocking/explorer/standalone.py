@@ -36,16 +36,16 @@ from rocking.records.catalogue import info, load, read_differences
 from rocking.records.units import choose_unit
 
 #: Records in the page by default: a near-fault pulse, and the long record of the tutorials.
-RECORDS: Final = ("el-centro-meloland-270", "ridgecrest-clc-090")
+RECORD_NAMES: Final = ("el-centro-meloland-270", "ridgecrest-clc-090")
 
 #: Pulses in the page by name, besides sines of several cycles.
-PULSES: Final = ("one-sine", "one-cosine", "half-sine", "rectangular", "triangular", "ricker")
+PULSE_NAMES: Final = ("one-sine", "one-cosine", "half-sine", "rectangular", "triangular", "ricker")
 
 #: Largest size of the compressed file, bytes.
 MAX_SIZE: Final = 600_000
 
 #: Parts of an address that the page reads.
-_SHOWN: Final = (
+_READ_NAMES: Final = (
     "width", "height", "offset", "restitution", "motion", "pga", "initial_rotation", "chattering", "model", "ask",
 )  # fmt: skip
 
@@ -53,11 +53,11 @@ _SHOWN: Final = (
 _DRAWN_STEP: Final = 0.04
 _DRAWN_UNIT: Final = 1e-4
 
-_KERNELS: Final = {"march": "march.march", "trace": "trace.trace", "write_pieces": "ground.write_pieces"}
+_KERNEL_NAMES: Final = {"march": "march.march", "trace": "trace.trace", "write_pieces": "ground.write_pieces"}
 _IMPORT: Final = re.compile(r'^import \{[^}]*\} from "([^"]+)";\n', re.MULTILINE)
 
 
-def build_page(names: Sequence[str] = RECORDS, exercises: Path | None = None, *, served: bool = False) -> str:
+def build_page(names: Sequence[str] = RECORD_NAMES, exercises: Path | None = None, *, served: bool = False) -> str:
     """Create the page with these shipped records, and the links of a class, as HTML text.
 
     A page that the explorer's server sends (``served``) leads to the explorer, whose link it redeems.
@@ -94,7 +94,7 @@ def is_available() -> bool:
     return bool(library.read_manifest().get("page"))
 
 
-def read_exercises(path: Path, names: Sequence[str] = RECORDS) -> list[dict[str, str]]:
+def read_exercises(path: Path, names: Sequence[str] = RECORD_NAMES) -> list[dict[str, str]]:
     """Read the links of a class: in each line words, and at its end the address of a case; or a heading alone.
 
     Raises
@@ -124,13 +124,13 @@ def _check_case(link: str, names: Sequence[str]) -> str:
     """Return the case of a link after checking that the page can show it."""
     case = link.partition("#")[2] or link.rpartition("?")[2]
     texts = dict(parse_qsl(case))
-    unknown = texts.keys() - _SHOWN
+    unknown = texts.keys() - _READ_NAMES
     if unknown:
-        raise OptionError(f"the page cannot show {min(unknown)!r}; it shows {', '.join(_SHOWN)}")
+        raise OptionError(f"the page cannot show {min(unknown)!r}; it shows {', '.join(_READ_NAMES)}")
     texts.pop("ask", None)
     motion = texts.get("motion", "none").partition(":")[0]
-    if motion not in ("none", "sine", *PULSES, *names):
-        raise OptionError(f"the page has no motion named {motion!r}; it has sine, {', '.join((*PULSES, *names))}")
+    if motion not in ("none", "sine", *PULSE_NAMES, *names):
+        raise OptionError(f"the page has no motion named {motion!r}; it has sine, {', '.join((*PULSE_NAMES, *names))}")
     read_case(texts, UploadStore())
     return case
 
@@ -141,7 +141,7 @@ def _uses_only(tour: Mapping[str, Any], names: Sequence[str]) -> bool:
     return all(":" in motion or motion in names for motion in cases)
 
 
-def describe_computation(names: Sequence[str] = RECORDS) -> dict[str, Any]:
+def describe_computation(names: Sequence[str] = RECORD_NAMES) -> dict[str, Any]:
     """Describe kernels, records and motions for the modules of the page."""
     sample = ground.build_ground(np.zeros(1), np.zeros((0, 2)), 1.0 / STANDARD_GRAVITY, 0.0)
     return {
@@ -149,7 +149,7 @@ def describe_computation(names: Sequence[str] = RECORDS) -> dict[str, Any]:
         "fingerprint": compiled.fingerprint(),
         "gravity": STANDARD_GRAVITY,
         "wasm": base64.b64encode(_read_webassembly()).decode(),
-        "calls": {name: _describe_call(kernel) for name, kernel in _KERNELS.items()},
+        "calls": {name: _describe_call(kernel) for name, kernel in _KERNEL_NAMES.items()},
         "layouts": {
             name: _describe_layout(kind)
             for name, kind in (
@@ -162,7 +162,7 @@ def describe_computation(names: Sequence[str] = RECORDS) -> dict[str, Any]:
         "events": _list_codes(state.EventKind),
         "ground": {"first": sample.first_column, "stretch": ground.PIECES_PER_STRETCH, "unit": sample.g_per_unit},
         "budget": {"slice": STEPS_PER_SLICE, "total": STEP_BUDGET, "per_piece": STEP_BUDGET_PER_PIECE},
-        "pulses": {name: _describe_pulse(getattr(pulses, name.replace("-", "_"))(1.0, 1.0)) for name in PULSES},
+        "pulses": {name: _describe_pulse(getattr(pulses, name.replace("-", "_"))(1.0, 1.0)) for name in PULSE_NAMES},
         "records": {name: _describe_record(name) for name in names},
     }  # fmt: skip
 

@@ -29,7 +29,7 @@ _MAX_POINTS: Final = 1_000_000
 _MAX_NAMES: Final = 1000
 
 #: Parameters of a block, and their units in a study.
-_PARAMETERS: Final = {"p": "rad/s", "alpha": "rad", "restitution": ""}
+_PARAMETER_UNITS: Final = {"p": "rad/s", "alpha": "rad", "restitution": ""}
 
 #: Value of blocks with unknown outcome, because the simulation was abandoned or stopped.
 UNDECIDED: Final = -1.0
@@ -53,10 +53,10 @@ class StudyView:
             raise StudyError(f"nothing of the study in {folder} is done yet: rocking study run {folder}")
         product = self.study.product
         blocks, scales = product.blocks, np.asarray(product.scales.values, dtype=float)
-        columns = {name: getattr(blocks, name)[:, 0] for name in _PARAMETERS}
+        columns = {name: getattr(blocks, name)[:, 0] for name in _PARAMETER_UNITS}
         grid = {name: np.unique(column) for name, column in columns.items()}
-        distinct = len(np.unique(np.column_stack([*columns.values()]), axis=0))
-        if not (blocks.is_symmetric and distinct == len(blocks) == math.prod(map(len, grid.values()))):
+        distinct_count = len(np.unique(np.column_stack([*columns.values()]), axis=0))
+        if not (blocks.is_symmetric and distinct_count == len(blocks) == math.prod(map(len, grid.values()))):
             grid = columns = {"block": np.arange(1.0, len(blocks) + 1.0)}
         self._grid: dict[str, Floats] = grid
         positions = [np.searchsorted(grid[name], column) for name, column in columns.items()]
@@ -100,8 +100,8 @@ class StudyView:
         results = results.isel({name: position for name, position in positions.items() if name in results.dims})
         values = results[quantity]
         if quantity == "overturned":
-            is_open = (results.unfinished + results.ended_early > 0) & (values == 0)
-            values = values.astype(float).where(~is_open, UNDECIDED)
+            is_undecided = (results.unfinished + results.ended_early > 0) & (values == 0)
+            values = values.astype(float).where(~is_undecided, UNDECIDED)
         order = [name for name in ("motion", "scale", *self._grid) if name in (x, y)]
         by_dimension = values.transpose(*[name for name in ("motion", "scale", "block") if name in values.dims])
         drawn = np.asarray(by_dimension, dtype=float).reshape([len(self.axes[name]) for name in order])
@@ -118,15 +118,15 @@ class StudyView:
 
     def point_to_texts(self, texts: Mapping[str, str], uploads: UploadStore) -> dict[str, str]:
         """Return the texts of the simulation nearest to a point of a slice."""
-        product, at = self.study.product, {name: self._read_index(texts, name) for name in self.axes}
+        product, index = self.study.product, {name: self._read_index(texts, name) for name in self.axes}
         for direction in ("x", "y"):
             name = checks.choice(texts.get(direction), direction, OptionError, self._varied)
             coordinate = read_number(texts.get(f"at_{direction}", ""), f"at_{direction}")
             checks.finite(coordinate, f"at_{direction}", OptionError)
-            at[name] = int(np.argmin(np.abs(self.axes[name] - coordinate)))
-        block, motion = self._blocks[tuple(at[name] for name in self._grid)], product.motions[at["motion"]]
-        factor = product.signs[at["polarity"]] * float(product.scales.factors(motion)[self._scales[at["scale"]]])
-        sides = {name: getattr(product.blocks, name)[block].tolist() for name in _PARAMETERS}
+            index[name] = int(np.argmin(np.abs(self.axes[name] - coordinate)))
+        block, motion = self._blocks[tuple(index[name] for name in self._grid)], product.motions[index["motion"]]
+        factor = product.signs[index["polarity"]] * float(product.scales.factors(motion)[self._scales[index["scale"]]])
+        sides = {name: getattr(product.blocks, name)[block].tolist() for name in _PARAMETER_UNITS}
         parameters = Block.from_parameters(**sides, gravity=float(product.blocks.gravity))
         point_texts = block_to_texts(parameters) | motion_to_texts(motion, uploads, factor)
         point_texts |= {"model": product.model, "chattering": str(product.chattering)}
@@ -137,7 +137,7 @@ class StudyView:
         return read_count(texts.get(f"{name}_index") or "0", f"{name}_index", 0, len(self.axes[name]) - 1)
 
     def _describe_axis(self, name: str) -> dict[str, Any]:
-        description = {"name": name, "unit": _PARAMETERS.get(name, ""), "values": self.axes[name].tolist()}
+        description = {"name": name, "unit": _PARAMETER_UNITS.get(name, ""), "values": self.axes[name].tolist()}
         if name == "scale":
             measure = self.study.product.scales.measure or FACTOR
             unit = "" if measure.units == "1" else measure.units

@@ -23,7 +23,7 @@ from rocking.solid.mesh import SHIPPED_MESHES
 
 #: Largest file, bytes: twenty times a long record of three channels.
 MAX_FILE_SIZE: Final = 16 * 2**20
-TOO_LARGE: Final = f"a file may have {MAX_FILE_SIZE // 2**20} MiB: cut a record into smaller files, or coarsen a mesh"
+SIZE_ADVICE: Final = f"a file may have {MAX_FILE_SIZE // 2**20} MiB: cut a record into smaller files, or coarsen a mesh"
 
 #: Maximum number of files, forty stations of three components, and their bytes. Further records are rejected, so that
 #: none disappears unnoticed.
@@ -78,11 +78,11 @@ class UploadStore:
             message = f"{lines} lines, of which at most {_MAX_LINES} are read here; cut the record into smaller files"
             raise RecordError(message, path=upload.name)
         if len(data) > MAX_FILE_SIZE:
-            raise RecordError(TOO_LARGE, path=upload.name)
+            raise RecordError(SIZE_ADVICE, path=upload.name)
         key = hashlib.sha256(upload.name.encode() + b"\0" + data).hexdigest()[:_KEY_LENGTH]
         with self._lock:
-            others = [file for name, file in self._files.items() if name != key]
-            if len(others) >= MAX_FILES or sum(len(file.data) for file in others) + len(data) > MAX_BYTES:
+            other_files = [file for name, file in self._files.items() if name != key]
+            if len(other_files) >= MAX_FILES or sum(len(file.data) for file in other_files) + len(data) > MAX_BYTES:
                 limits = f"{MAX_FILES} files and {MAX_BYTES // 2**20} MiB are kept at most"
                 raise RecordError(f"it cannot be kept: {limits}; remove records from the list first", path=upload.name)
             self._files[key] = upload
@@ -104,8 +104,8 @@ class UploadStore:
     def count_usage(self) -> dict[str, int]:
         """Return number and bytes of the stored files, and their limits."""
         with self._lock:
-            total = sum(len(upload.data) for upload in self._files.values())
-            return {"files": len(self._files), "bytes": total, "most_files": MAX_FILES, "most_bytes": MAX_BYTES}
+            byte_count = sum(len(upload.data) for upload in self._files.values())
+            return {"files": len(self._files), "bytes": byte_count, "most_files": MAX_FILES, "most_bytes": MAX_BYTES}
 
     def add_motion(self, motion: Motion) -> str:
         """Store a motion of the program, and return its key."""
@@ -213,5 +213,5 @@ def clean_file_name(name: str) -> str:
     ('passwd', 'RSN6.AT2', 'record')
     """
     file_name = PurePosixPath(PureWindowsPath(name).name).name
-    printable = "".join(letter for letter in file_name if letter.isprintable()).strip()
+    printable = "".join(character for character in file_name if character.isprintable()).strip()
     return printable[-_NAME_LENGTH:] or "record"

@@ -34,7 +34,7 @@ _MAX_GAPS: Final = 0.05
 
 #: Levels without a unit that are read as m/s^2 but are probably in g.
 _MAX_AMBIGUOUS_LEVEL: Final = 1.5
-_UNITLESS: Final = re.compile(r"[\d.+-]+(?:e[+-]?\d+)?", re.IGNORECASE)
+_PURE_NUMBER: Final = re.compile(r"[\d.+-]+(?:e[+-]?\d+)?", re.IGNORECASE)
 
 #: Largest plausible diagonal of a block, m.
 _MAX_LENGTH: Final = 30.0
@@ -89,7 +89,7 @@ def list_vertical_notes(motion: Motion) -> tuple[str, ...]:
     if _HORIZONTAL_CHANNEL.fullmatch(direction) and not _find_origin(vertical).is_vertical:
         notes.append(f"the channel {direction!r} looks horizontal, but it is taken for the vertical motion")
     for attribute in ("station", "event"):
-        upward, level = (getattr(_find_origin(c), attribute) for c in (vertical, motion))
+        upward, level = (getattr(_find_origin(component), attribute) for component in (vertical, motion))
         if upward and level and _normalise(upward) != _normalise(level):
             notes.append(f"the vertical motion is of the {attribute} {upward!r}, the horizontal one of {level!r}")
     return (*notes, *_list_timing_notes(motion, vertical))
@@ -125,7 +125,7 @@ def _list_gap_notes(motion: Motion) -> list[str]:
 
 def list_level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
     """Return likely mistakes in an acceleration (m/s^2) that was read from a text; empty if there are none."""
-    if _UNITLESS.fullmatch(text.strip()) is None or not 0.0 < value <= _MAX_AMBIGUOUS_LEVEL:
+    if _PURE_NUMBER.fullmatch(text.strip()) is None or not 0.0 < value <= _MAX_AMBIGUOUS_LEVEL:
         return ()
     sentence = f"{{}} {text} is taken for {value:g} m/s^2, {value / STANDARD_GRAVITY:.3g} g; write {text}g for {text} g"
     return (Message(sentence, (name,)),)
@@ -163,8 +163,8 @@ def list_block_notes(block: Block) -> tuple[str, ...]:
         length_text = f"{diagonal:.0f} m, more than {_MAX_LENGTH:g} m"
         notes.append(f"the diagonal of the block is {length_text}: are its sizes in metres?")
     if block.width is not None and block.height is not None and block.width > block.height:
-        wider = f"wider, {block.width:g} m, than it is high, {block.height:g} m"
-        notes.append(f"the block is {wider}: are the sizes swapped?")
+        size_text = f"wider, {block.width:g} m, than it is high, {block.height:g} m"
+        notes.append(f"the block is {size_text}: are the sizes swapped?")
     slender, stocky = sorted(block.sides, key=lambda side: side.alpha)
     if slender.alpha < stocky.alpha and slender.p <= stocky.p:
         notes.append(

@@ -33,9 +33,9 @@ _DEGREE: Final = Unit("deg", math.pi / 180.0, 1.0)
 
 def _index_units(*units: Unit, **spellings: str) -> dict[str, Unit]:
     """Return units by their plain spellings, with the unit of a number without one, and further spellings."""
-    known = {normalise_spelling(unit.name): unit for unit in units}
-    further = {spelling: known[name] for name, line in spellings.items() for spelling in line.split()}
-    return {"": _SI_UNIT, **known, **further}
+    units_by_name = {normalise_spelling(unit.name): unit for unit in units}
+    alternatives = {spelling: units_by_name[name] for name, line in spellings.items() for spelling in line.split()}
+    return {"": _SI_UNIT, **units_by_name, **alternatives}
 
 
 _METRIC_LENGTHS: Final = (_SI_UNIT._replace(name="m"), Unit("cm", 1.0, 100.0), Unit("mm", 1.0, 1000.0))
@@ -172,8 +172,8 @@ def read_array(text: str, name: str, reader: NumberReader = read_number) -> Floa
 
 def read_level_at_period(text: str, name: str, reader: NumberReader = read_acceleration) -> tuple[float, float]:
     """Return an acceleration, m/s^2, and a period, s, from "0.4g@1.0"."""
-    level, at, period = text.partition("@")
-    if not at:
+    level, separator, period = text.partition("@")
+    if not separator:
         raise OptionError(f"{{}} must be an acceleration at a period, as 0.4g@1.0, not {text!r}", name, value=text)
     return reader(level, name), read_duration(period, name)
 

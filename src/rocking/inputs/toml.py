@@ -15,7 +15,7 @@ from rocking.errors import MotionError, RecordError, RockingError, StudyError
 _Error = TypeVar("_Error", bound=RockingError)
 
 
-class Tables:
+class TomlFile:
     """Tables of a file, with the line of each key."""
 
     def __init__(self, path: str | Path) -> None:

@@ -138,9 +138,9 @@ class Description:
             origin = replace(origin, azimuth=azimuth, is_reversed=not origin.is_reversed)
         return replace(self, parameters=parameters, origin=origin)
 
-    def changed(self, how: str) -> Description:
+    def changed(self, change: str) -> Description:
         """Return the description of a changed motion, with the change ("delayed", "processed") once in its family."""
-        family = self.family if self.family.startswith(f"{how} ") else f"{how} {self.family}"
+        family = self.family if self.family.startswith(f"{change} ") else f"{change} {self.family}"
         origin = None if self.origin is None else replace(self.origin, start=None)
         return replace(self, family=family, origin=origin)
 

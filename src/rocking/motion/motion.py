@@ -216,7 +216,7 @@ class Motion(ProcessingMethods):
         --------
         rocking.Measure : intensity measure.
         """
-        intensity_measure = Measure.parse(measure, among=SCALING_MEASURES)
+        intensity_measure = Measure.parse(measure, names=SCALING_MEASURES)
         if intensity_measure.name == "factor":
             return self.scaled(level)
         target = checks.positive(level, "level", MotionError, intensity_measure.units)
@@ -353,7 +353,7 @@ class Motion(ProcessingMethods):
         with np.errstate(over="ignore", invalid="ignore"):
             coefficients = self.coefficients * factor
         if not np.all(np.abs(coefficients[:, 0]) <= piecewise.MAX_ACCELERATION) or not np.isfinite(coefficients).all():
-            raise MotionError(piecewise.TOO_STRONG)
+            raise MotionError(piecewise.TOO_STRONG_MESSAGE)
         description, history = self.description.scaled(factor), (*self.history, history_entry)
         fields |= {"description": description, "history": history, "error": self.error * abs(factor)}
         return replace(self, coefficients=coefficients, **fields)
@@ -394,13 +394,13 @@ def compute_uplift_factors(
         widths = np.diff(motion.breakpoints)
         peaks = np.array([[piecewise.compute_maximum(widths, sign * motion.coefficients) for sign in (-1.0, 1.0)]])
     else:
-        breakpoints, (push, vertical) = piecewise.align_pieces(motion, motion.vertical)
+        breakpoints, (horizontal, vertical) = piecewise.align_pieces(motion, motion.vertical)
         widths = np.diff(breakpoints)
 
         def find_peak(sign: float, threshold: float) -> float:
             if np.isinf(threshold):
                 return 0.0
-            return piecewise.compute_maximum(widths, sign * push - threshold / gravity * vertical)
+            return piecewise.compute_maximum(widths, sign * horizontal - threshold / gravity * vertical)
 
         peaks = np.array([[find_peak(-1.0, plus), find_peak(1.0, minus)] for plus, minus in weight_pairs])
     with np.errstate(divide="ignore"):
@@ -427,6 +427,6 @@ def _find_crossings(motion: Motion, level: float, pieces: Flags) -> Floats:
     shifted = motion.coefficients[pieces]
     shifted[:, 0] -= level
     offsets = piecewise.find_root_candidates(widths, shifted)
-    inside = (offsets > 0.0) & (offsets < widths[:, np.newaxis])
-    times: Floats = (motion.breakpoints[:-1][pieces][:, np.newaxis] + offsets)[inside]
+    is_inside = (offsets > 0.0) & (offsets < widths[:, np.newaxis])
+    times: Floats = (motion.breakpoints[:-1][pieces][:, np.newaxis] + offsets)[is_inside]
     return times

@@ -27,7 +27,7 @@ class _Component(MotionMeasures):
 def iterate_directions(first: MotionMeasures, second: MotionMeasures) -> Iterator[MotionMeasures]:
     """Yield the motion in each direction."""
     breakpoints, rows = piecewise.align_pieces(first, second)
-    return (_Component(breakpoints, c * rows[0] + s * rows[1]) for c, s in _DIRECTIONS)
+    return (_Component(breakpoints, cosine * rows[0] + sine * rows[1]) for cosine, sine in _DIRECTIONS)
 
 
 def compute_directional_peaks(first: MotionMeasures, second: MotionMeasures, integrations: int) -> Floats:
@@ -47,8 +47,8 @@ def compute_directional_spectrum(
     breakpoints, components = piecewise.align_pieces(first, second)
     # The last extremum follows the motion within half a damped period.
     tail = math.pi / (rate * math.sqrt(1.0 - damping**2))
-    solved = [compute_oscillator(piecewise.Pieces(breakpoints, each), rate, damping, tail) for each in components]
-    return rate**2 * _find_peaks(np.diff(solved[0][0]), solved[0][1], solved[1][1])
+    responses = [compute_oscillator(piecewise.Pieces(breakpoints, rows), rate, damping, tail) for rows in components]
+    return rate**2 * _find_peaks(np.diff(responses[0][0]), responses[0][1], responses[1][1])
 
 
 def _find_peaks(widths: Floats, first: Floats, second: Floats) -> Floats:
@@ -66,6 +66,6 @@ def _find_peaks(widths: Floats, first: Floats, second: Floats) -> Floats:
     )
     peaks = np.empty(len(_DIRECTIONS))
     for k, (cosine, sine) in enumerate(_DIRECTIONS):
-        near = bounds >= lower[k]
-        peaks[k] = piecewise.compute_peak_magnitude(widths[near], cosine * first[near] + sine * second[near])
+        is_near = bounds >= lower[k]
+        peaks[k] = piecewise.compute_peak_magnitude(widths[is_near], cosine * first[is_near] + sine * second[is_near])
     return peaks

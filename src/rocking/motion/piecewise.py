@@ -25,7 +25,9 @@ _STEP_ROUNDING: Final = 4.0 * np.finfo(np.float64).eps
 MAX_ACCELERATION: Final = 1e30
 _MAX_DURATION: Final = 1e15
 
-TOO_STRONG: Final = f"the acceleration of a motion must stay below {MAX_ACCELERATION:g} m/s^2: check units and scale"
+TOO_STRONG_MESSAGE: Final = (
+    f"the acceleration of a motion must stay below {MAX_ACCELERATION:g} m/s^2: check units and scale"
+)
 
 #: Far below any ground motion. Pieces may be shorter, but not change faster than over this time.
 MIN_DURATION: Final = 1e-9
@@ -201,9 +203,9 @@ def _find_numerical_roots(widths: Floats, coefficients: Floats) -> Floats:
 def _compute_significant_degrees(pieces: Floats) -> Integers:
     """Return the degree of each piece without leading coefficients far below rounding, which distort the roots."""
     sizes = np.abs(pieces)
-    significant = sizes > 1e-18 * np.max(sizes, axis=1, keepdims=True)
-    last = pieces.shape[1] - 1 - np.argmax(significant[:, ::-1], axis=1)
-    return np.where(significant.any(axis=1), last, 0)
+    is_significant = sizes > 1e-18 * np.max(sizes, axis=1, keepdims=True)
+    last = pieces.shape[1] - 1 - np.argmax(is_significant[:, ::-1], axis=1)
+    return np.where(is_significant.any(axis=1), last, 0)
 
 
 def _compute_control_points(widths: Floats, coefficients: Floats) -> Floats:
@@ -275,7 +277,7 @@ def check_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Float
         raise MotionError(f"{message}: check its units")
     with np.errstate(over="ignore"):
         if not np.all(evaluate_pieces(np.abs(rows), widths) <= MAX_ACCELERATION):
-            raise MotionError(TOO_STRONG)
+            raise MotionError(TOO_STRONG_MESSAGE)
         if not np.all(evaluate_pieces(np.abs(rows), np.maximum(widths, MIN_DURATION)) <= MAX_ACCELERATION):
             excess = f"it would exceed {MAX_ACCELERATION:g} m/s^2 within {MIN_DURATION:g} s"
             raise MotionError(f"a piece of a motion is too steep: {excess}; check units and times")
@@ -289,9 +291,9 @@ def check_samples(acceleration: ArrayLike) -> Floats:
     values = _convert_array(acceleration, "accelerations", 1)
     if len(values) < 2:
         raise MotionError(f"a motion requires at least two samples; got {len(values)}")
-    bad = np.flatnonzero(~np.isfinite(values))
-    if len(bad):
-        place = f"{values[bad[0]]} at sample {bad[0]}"
+    fault_indices = np.flatnonzero(~np.isfinite(values))
+    if len(fault_indices):
+        place = f"{values[fault_indices[0]]} at sample {fault_indices[0]}"
         raise MotionError(f"every sample of a motion must be a finite number; got {place}")
     return values
 
@@ -300,8 +302,8 @@ def check_step(dt: float) -> float:
     """Return a sampling step, s."""
     if np.ndim(dt) != 0:
         raise MotionError("{} must be one number; for uneven times use Motion.from_points(times, acceleration)", "dt")
-    positive = checks.positive(dt, "dt", MotionError, "s")
-    return checks.between(positive, "dt", MotionError, MIN_DURATION, 1.0 / MIN_DURATION, "s: check its units")
+    step = checks.positive(dt, "dt", MotionError, "s")
+    return checks.between(step, "dt", MotionError, MIN_DURATION, 1.0 / MIN_DURATION, "s: check its units")
 
 
 def check_times(times: ArrayLike, count: int) -> Floats:

@@ -98,10 +98,10 @@ class ProcessingMethods(MotionMeasures):
             raise MotionError(message, "other", value=other)
         azimuths = _resolve_azimuths(self, other, recorded)
         if delay := compute_start_delay(self.description, other.description, self.dt):
-            early, late = (self, other) if delay > 0.0 else (other, self)
-            first, second = checks.short_repr(early.name), checks.short_repr(late.name)
+            earlier_motion, later_motion = (self, other) if delay > 0.0 else (other, self)
+            first, second = checks.short_repr(earlier_motion.name), checks.short_repr(later_motion.name)
             message = f"according to their files, {second} begins {abs(delay):.6g} s after {first}"
-            call = f"processed(trim=({abs(delay):.6g}, {early.duration:.6g}))"
+            call = f"processed(trim=({abs(delay):.6g}, {earlier_motion.duration:.6g}))"
             raise MotionError(f"{message}; remove the start of the latter with {call}")
         target = checks.finite(azimuth, "azimuth", MotionError)
         if self.vertical is not None and other.vertical not in (None, self.vertical):
@@ -128,8 +128,8 @@ class ProcessingMethods(MotionMeasures):
         wait = checks.positive(delay, "delay", MotionError, "s")
         rows = np.vstack([np.zeros((1, self.coefficients.shape[1])), self.coefficients])
         pieces = {"breakpoints": np.append(0.0, self.breakpoints + wait), "coefficients": rows}
-        others = {name: part and part.delayed(wait) for name, part in self._collect_other_components().items()}
-        return self._derive("delayed", f"delayed by {wait:.6g} s", **pieces, **others)
+        components = {name: part and part.delayed(wait) for name, part in self._collect_other_components().items()}
+        return self._derive("delayed", f"delayed by {wait:.6g} s", **pieces, **components)
 
     def on_floor(self, period: float, damping: float = DEFAULT_DAMPING, *, free_vibration: float | None = None) -> Self:
         """Return the motion of a floor: the absolute acceleration of a linear oscillator under the motion.
@@ -215,13 +215,13 @@ class ProcessingMethods(MotionMeasures):
             steps.append(lambda motion: _resample(motion, resample))
         if window is None and not steps:
             raise MotionError("at least one of trim, baseline, band_pass and resample is required")
-        others = self._collect_other_components()
-        for name, part in others.items():
+        other_components = self._collect_other_components()
+        for name, part in other_components.items():
             if part is not None and window is not None and window[0] > part.duration - piecewise.MIN_DURATION:
-                others[name] = None  # this component has ended by then
+                other_components[name] = None  # this component has ended by then
             elif part is not None:
-                others[name] = part._apply_steps(window, steps, self.dt)
-        return replace(self._apply_steps(window, steps), **others)  # type: ignore[type-var]
+                other_components[name] = part._apply_steps(window, steps, self.dt)
+        return replace(self._apply_steps(window, steps), **other_components)  # type: ignore[type-var]
 
     def _apply_steps(
         self, window: tuple[float, float] | None, steps: list[_ProcessingStep], fine_step: float | None = None

@@ -141,10 +141,10 @@ class Measure:
             raise OptionError(f'{{}} applies only to {{}} "sa", not to "{self.name}"', argument, "measure")
 
     @classmethod
-    def parse(cls, measure: MeasureName | Measure, among: Sequence[str] = INTENSITIES) -> Measure:
+    def parse(cls, measure: MeasureName | Measure, names: Sequence[str] = INTENSITIES) -> Measure:
         """Return a measure, or the measure with an accepted name."""
         name = measure.name if isinstance(measure, Measure) else measure
-        checks.choice(name, "measure", OptionError, among)
+        checks.choice(name, "measure", OptionError, names)
         if isinstance(measure, Measure):
             return measure
         if measure in ("sa", "sa_average"):
@@ -172,15 +172,15 @@ class Measure:
     @property
     def quantity(self) -> str:
         """Name in words, with the component of a pair, and the damping unless it is 5 %."""
-        return self._qualify(_QUANTITIES[self.name].name, " at {}")
+        return self._add_oscillator(_QUANTITIES[self.name].name, " at {}")
 
     @property
     def short_name(self) -> str:
         """Name for a table or a figure: PGA, PGV, SA(1 s), with the damping unless it is 5 %."""
         quantity = _QUANTITIES[self.name]
-        return self._qualify(quantity.short_name or quantity.name, "({})")
+        return self._add_oscillator(quantity.short_name or quantity.name, "({})")
 
-    def _qualify(self, name: str, oscillator: str) -> str:
+    def _add_oscillator(self, name: str, oscillator: str) -> str:
         """Add oscillator and component to a name."""
         name += "" if self.period is None else oscillator.format(self._oscillator_text)
         return name if self.component == "own" else f"{name}, {_COMPONENTS[self.component]}"
@@ -243,8 +243,8 @@ class Measure:
             raise MotionError(message + "use records.load_pairs, or with_orthogonal")
         if self.component.startswith("rotd"):
             return self._compute_rotated(motion, orthogonal)
-        both = [self._compute(part) for part in (motion, orthogonal)]
-        return max(both) if self.component == "larger" else math.sqrt(both[0] * both[1])
+        values = [self._compute(part) for part in (motion, orthogonal)]
+        return max(values) if self.component == "larger" else math.sqrt(values[0] * values[1])
 
     def _compute(self, motion: MotionMeasures) -> float:
         """Compute the measure of one component."""

@@ -101,8 +101,8 @@ def synthesize_motions(
     """
     number = checks.integer(count, "count", OptionError, 1)
     first_seed = checks.integer(seed, "seed", OptionError, 0)
-    positive = {"arias_intensity": arias_intensity, "duration": duration, "middle_time": middle_time, "dt": dt}
-    values = {name: checks.positive(value, name, OptionError) for name, value in positive.items()}
+    positive_values = {"arias_intensity": arias_intensity, "duration": duration, "middle_time": middle_time, "dt": dt}
+    values = {name: checks.positive(value, name, OptionError) for name, value in positive_values.items()}
     values["frequency"] = checks.positive(frequency, "frequency", OptionError, "Hz")
     values["frequency_rate"] = checks.finite(frequency_rate, "frequency_rate", OptionError)
     values["damping"] = checks.fraction(damping, "damping", OptionError)
@@ -125,8 +125,8 @@ def _compute_envelope(values: dict[str, float]) -> Floats:
 
     def compute_ratio(log_shape: float) -> float:
         """Compute the duration divided by the time of the middle, which decreases with the shape."""
-        first, middle, last = gammaincinv(math.exp(log_shape), (0.05, _MIDDLE_SHARE, 0.95))
-        return float((last - first) / middle)
+        start_time, middle_time, end_time = gammaincinv(math.exp(log_shape), (0.05, _MIDDLE_SHARE, 0.95))
+        return float((end_time - start_time) / middle_time)
 
     ratio, limits = values["duration"] / values["middle_time"], (0.0, math.log(1e4))
     largest, smallest = map(compute_ratio, limits)
@@ -160,8 +160,8 @@ def _generate_samples(values: dict[str, float], envelope: Floats, frequencies: F
         message = f"{{}} must be at most a quarter of the shortest period of the filter, {0.25 / highest:.2g} s"
         raise OptionError(f"{message}; the frequency reaches {highest:.4g} Hz", "dt", value=step)
     rates = 2.0 * math.pi * frequencies[:samples]
-    damped = math.sqrt(1.0 - values["damping"] ** 2)
-    factors = np.exp(step * rates * complex(-values["damping"], damped))  # of an impulse response in one step
+    damped_ratio = math.sqrt(1.0 - values["damping"] ** 2)
+    factors = np.exp(step * rates * complex(-values["damping"], damped_ratio))  # of an impulse response in one step
     noise = np.empty((-(-count // _GROUP_SIZE), samples, _GROUP_SIZE))
     for k in range(len(noise) * _GROUP_SIZE):
         noise[k // _GROUP_SIZE, :, k % _GROUP_SIZE] = np.random.default_rng([seed, k]).standard_normal(samples)
@@ -169,12 +169,12 @@ def _generate_samples(values: dict[str, float], envelope: Floats, frequencies: F
     for start in range(0, samples, _BATCH_SIZE):
         rows = np.zeros((_BATCH_SIZE, samples))
         for row in range(min(_BATCH_SIZE, samples - start)):
-            now = start + row
-            responses[:now] *= factors[:now]
-            impulses = rates[:now] * responses[:now].imag
+            time_index = start + row
+            responses[:time_index] *= factors[:time_index]
+            impulses = rates[:time_index] * responses[:time_index].imag
             norm = math.sqrt(float(impulses @ impulses))
-            rows[row, :now] = envelope[now] / norm * impulses if norm > 0.0 else 0.0
-            responses[now] = 1.0
+            rows[row, :time_index] = envelope[time_index] / norm * impulses if norm > 0.0 else 0.0
+            responses[time_index] = 1.0
         for group, group_noise in zip(result, noise, strict=True):
             group[start : start + _BATCH_SIZE] = (rows @ group_noise)[: samples - start]
     return result.swapaxes(0, 1).reshape(samples, -1)[:, :count]

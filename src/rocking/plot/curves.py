@@ -59,8 +59,8 @@ def draw_fragility(
             axes.fill_between(line.intensity, line.lower, line.upper, color=style["color"], alpha=0.18, linewidth=0.0)
             axes.plot(line.intensity, line.probability, linewidth=1.5, label=escape_dollars(line.label), **style)
             # Every limit state has its own marker.
-            dots = _GROUP_MARKER | {"color": style["color"], "clip_on": False}
-            axes.plot(line.group_intensity, line.observed, "os^D"[k % 4], **dots)
+            dot_style = _GROUP_MARKER | {"color": style["color"], "clip_on": False}
+            axes.plot(line.group_intensity, line.observed, "os^D"[k % 4], **dot_style)
         is_bounded = any(np.any(line.lower < line.upper) for line in lines)
         axes.fill_between([], [], color=GREY, alpha=0.4 * is_bounded, linewidth=0.0, label=band_label)
         axes.plot([], [], "o", color=GREY, label="dot: share of outcomes at about its intensity", **_GROUP_MARKER)
@@ -201,7 +201,7 @@ class SpectrumCurves(NamedTuple):
     """
 
     label: str
-    singles: Floats
+    single_curves: Floats
     fractiles: Floats
     overturned: Floats
 
@@ -230,11 +230,11 @@ def draw_spectrum(
         for k, (style, curve) in enumerate(zip(choose_styles(len(curves)), curves, strict=True)):
             peak_axes.plot([], [], linewidth=1.4, label=escape_dollars(curve.label) if k in labelled else "", **style)
             if has_singles:
-                singles = np.where(np.isfinite(curve.singles), curve.singles, np.nan)
+                singles = np.where(np.isfinite(curve.single_curves), curve.single_curves, np.nan)
                 peak_axes.plot(x, singles.T, color=style["color"], linewidth=0.5, alpha=0.35)
             for share, width in widths.items():
                 fractile = curve.fractiles[[*fractiles].index(share)]
-                _draw_peaks(peak_axes, x, curve.singles[0] if len(motions) == 1 else fractile, width, style)
+                _draw_peaks(peak_axes, x, curve.single_curves[0] if len(motions) == 1 else fractile, width, style)
             for panel in share_axes:
                 panel.step(x, curve.overturned, where="mid", linewidth=1.2, **style)
         if len(labelled) < len(curves):
@@ -343,7 +343,7 @@ _BIN_COUNT: Final = 24
 _TEST_MARKER: Final[dict[str, Any]] = {"linestyle": "", "markersize": 3.2, "markeredgewidth": 0.6, "clip_on": False}
 
 
-class Parameter(NamedTuple):
+class ParameterEstimate(NamedTuple):
     """One parameter of the blocks that explain the outcomes: values (blocks, sides) and estimates.
 
     estimates (sides, 3) : median, lower and upper end of its interval
@@ -360,25 +360,25 @@ def draw_outcomes(
     *,
     probabilities: Floats,
     overturned: Flags,
-    parameters: Sequence[Parameter],
+    parameters: Sequence[ParameterEstimate],
     weights: Floats,
     **options: Unpack[FigureOptions],
 ) -> Figure:
     """Draw the outcome of every test against its fitted probability, and the parameters of the blocks."""
     with open_page((7.0, 4.6), **options) as page:
         letters = "ABCDEFGHI"[: len(parameters)]
-        tests, *panels = page.create_panels(f"{'T' * len(parameters)};{letters}", height_ratios=(1.2, 1.0))
+        tests_panel, *panels = page.create_panels(f"{'T' * len(parameters)};{letters}", height_ratios=(1.2, 1.0))
         # Sorted, with each outcome at a probability of 0 or 1.
         order = np.argsort(probabilities, kind="stable")
         number, is_overturned = np.arange(1, order.size + 1), overturned[order]
-        tests.plot(number, probabilities[order], color=INK, linewidth=1.2, label="fitted probability")
+        tests_panel.plot(number, probabilities[order], color=INK, linewidth=1.2, label="fitted probability")
         fallen, standing = number[is_overturned], number[~is_overturned]
-        tests.plot(fallen, np.ones(fallen.size), "v", color=ACCENT, label="overturned", **_TEST_MARKER)
+        tests_panel.plot(fallen, np.ones(fallen.size), "v", color=ACCENT, label="overturned", **_TEST_MARKER)
         standing_style: Any = {"color": INK, "mfc": "white", "label": "did not overturn", **_TEST_MARKER}
-        tests.plot(standing, np.zeros(standing.size), "o", **standing_style)
-        tests.set_ylim(0.0, 1.0)
-        tests.grid(True)
-        add_labels(tests, "test, by its probability", "probability of overturning")
+        tests_panel.plot(standing, np.zeros(standing.size), "o", **standing_style)
+        tests_panel.set_ylim(0.0, 1.0)
+        tests_panel.grid(True)
+        add_labels(tests_panel, "test, by its probability", "probability of overturning")
         for panel, parameter in zip(panels, parameters, strict=False):
             _draw_parameter(panel, parameter, weights)
         if panels:
@@ -397,20 +397,20 @@ def draw_measured_history(
 ) -> Figure:
     """Draw measured and fitted rotation histories (rad, against s) and their residual."""
     with open_page((7.0, 4.0), **options) as page:
-        main, *residual_panels = page.create_panels("A;B", sharex=True, height_ratios=(2.4, 1.0))
-        main.plot(time, measured, ".", color=GREY, markersize=3.5, markeredgewidth=0.0, label="measured")
-        main.plot(fitted_time, fitted, color=ACCENT, linewidth=0.9, label="fitted")
-        main.set_xlim(time[0], time[-1])
-        add_labels(main, "" if residual_panels else "time (s)", "rotation (rad)")
+        main_panel, *residual_panels = page.create_panels("A;B", sharex=True, height_ratios=(2.4, 1.0))
+        main_panel.plot(time, measured, ".", color=GREY, markersize=3.5, markeredgewidth=0.0, label="measured")
+        main_panel.plot(fitted_time, fitted, color=ACCENT, linewidth=0.9, label="fitted")
+        main_panel.set_xlim(time[0], time[-1])
+        add_labels(main_panel, "" if residual_panels else "time (s)", "rotation (rad)")
         for panel in residual_panels:
             panel.plot(time, residual, color=INK, linewidth=0.6)
             add_labels(panel, "time (s)", "residual (rad)")
-        for panel in (main, *residual_panels):
+        for panel in (main_panel, *residual_panels):
             panel.axhline(0.0, color=INK, linewidth=0.4)
     return page.figure
 
 
-def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
+def _draw_parameter(axes: Axes, parameter: ParameterEstimate, weights: Floats) -> None:
     """Draw the distribution of the blocks, and the median and interval of the population's centre."""
     sides = parameter.values.shape[1]
     styles = {"side +": CURVES[3], "side -": CURVES[1]} if sides > 1 else {"both sides": CURVES[2] | {"linestyle": "-"}}

@@ -62,7 +62,7 @@ def draw_outcome_map(
     y: Floats,
     outcome: NDArray[np.integer],
     meanings: Sequence[str],
-    later: NDArray[np.bool_],
+    is_later: NDArray[np.bool_],
     x_label: str,
     y_label: str,
     **options: Unpack[FigureOptions],
@@ -75,8 +75,8 @@ def draw_outcome_map(
         (axes,) = page.create_panels()
         _colour_cells(axes, x, y, outcome, _OUTCOME_COLOURS[: len(meanings)])
         page.handles = [_create_patch((_OUTCOME_COLOURS[k], ""), meanings[k]) for k in np.unique(outcome)]
-        if later.any():
-            cells = np.ma.masked_where(~later, outcome)
+        if is_later.any():
+            cells = np.ma.masked_where(~is_later, outcome)
             # Two overlaid hatches are visible on the lightest and the darkest colours.
             for ink, width in (("#ffffff", 2.0), (_LATER_COLOUR, 0.9)):
                 style: dict[str, Any] = {"cmap": ListedColormap(["none"]), "edgecolor": ink, "linewidth": 0.0}
@@ -217,8 +217,8 @@ def draw_blocks(
     names, columns = [*panels], min(len(panels), _PANELS_PER_ROW)
     rows = [[*names[k : k + columns], *"." * (columns - len(names[k:]))] for k in range(0, len(names), columns)]
     all_values = np.concatenate([*panels.values()])
-    finite = all_values[np.isfinite(all_values)] if np.isfinite(all_values).any() else np.array([0.0, 1.0])
-    shades: dict[str, Any] = {"cmap": "cividis_r", "vmin": finite.min(), "vmax": finite.max()}
+    finite_values = all_values[np.isfinite(all_values)] if np.isfinite(all_values).any() else np.array([0.0, 1.0])
+    shades: dict[str, Any] = {"cmap": "cividis_r", "vmin": finite_values.min(), "vmax": finite_values.max()}
     size: dict[str, Any] = {"s": float(np.clip(9000.0 / len(p), 6.0, 60.0))}
     with open_page((columns * _PANEL_SIZE[0] + 0.6, len(rows) * _PANEL_SIZE[1] + 0.4), **options) as page:
         for axes, (name, values) in zip(page.create_panels(rows), panels.items(), strict=True):
@@ -269,11 +269,11 @@ def draw_basins(
         handles: list[Artist] = []
         for name, kind, shade, k, points in zip(names, kinds, shades, ranks, orbits, strict=True):
             handles.append(_create_patch((shade, ""), name))
-            inside = points[(points >= [x[0], y[0]]).all(axis=1) & (points <= [x[-1], y[-1]]).all(axis=1)]
-            if kind == "orbit" and len(inside):
+            visible_points = points[(points >= [x[0], y[0]]).all(axis=1) & (points <= [x[-1], y[-1]]).all(axis=1)]
+            if kind == "orbit" and len(visible_points):
                 style: dict[str, Any] = {"linestyle": "", "marker": _MARKERS[k % len(_MARKERS)], "markersize": 4.5}
                 style |= {"color": "white", "markeredgecolor": INK, "markeredgewidth": 0.8}
-                handles += axes.plot(*inside.T, label=f"{name}: its points", **style)
+                handles += axes.plot(*visible_points.T, label=f"{name}: its points", **style)
         add_labels(axes, x_label, y_label)
         page.handles = handles
     return page.figure

@@ -197,22 +197,22 @@ def note_skipped(reasons: Mapping[str, str]) -> None:
 
 
 def collect_pairs(
-    names: Any, *, with_vertical: bool, with_singles: bool = False, keep_going: bool = True, **options: Any
+    names: Any, *, with_vertical: bool, includes_singles: bool = False, keep_going: bool = True, **options: Any
 ) -> tuple[tuple[Motion, ...], dict[str, str]]:
     """Return the motions of `load_pairs`, and the reason for each file and station without them.
 
-    With `with_singles`, components of stations without exactly two horizontal ones are separate motions, and so are
+    With `includes_singles`, components of stations without exactly two horizontal ones are separate motions, and so are
     vertical ones unless `with_vertical`.
     """
     groups, reasons = _read_groups(names, Request.create(**options, are_defaults=True), keep_going=keep_going)
     motions = list[Motion]()
     for group in groups:
-        is_single = with_singles and len(group.horizontals) != 2
+        is_single = includes_singles and len(group.horizontals) != 2
         try:
             motions += group.horizontals if is_single else _pair_components(group, with_vertical=with_vertical)
         except (RecordError, MotionError) as error:
             reasons[group.station] = str(error).removeprefix(f"{group.station} ")
-        if with_singles and not with_vertical and group.vertical is not None:
+        if includes_singles and not with_vertical and group.vertical is not None:
             motions.append(group.vertical)
     if not motions:
         reason = ": ".join(next(iter(reasons.items()), ("there are no records",)))

@@ -72,7 +72,7 @@ def make_names_unique(names: Sequence[str]) -> list[str]:
     unique = []
     for name in names:
         candidates = (f"{name} #{k}" for k in itertools.count(1))
-        unique.append(next(new for new in candidates if new not in used) if name in repeated else name)
+        unique.append(next(choice for choice in candidates if choice not in used) if name in repeated else name)
         used.add(unique[-1])
     return unique
 
@@ -83,7 +83,7 @@ def _describe_wrong_type(value: Any) -> str:
 
 
 #: Name of a record with a factor.
-_FACTOR = re.compile(r"(?s)(.+) x ([+-]?\d[\d.]*(?:[eE][+-]?\d+)?)")
+_FACTOR_PATTERN = re.compile(r"(?s)(.+) x ([+-]?\d[\d.]*(?:[eE][+-]?\d+)?)")
 
 #: Name of the vertical component of the same station, for pairs.
 OWN = "own"
@@ -124,7 +124,7 @@ def correct_motion(name: str, original: Motion, request: Request, *, is_raw: boo
 
 def split_factor(name: str) -> tuple[str, float]:
     """Return the name and the factor of a record such as "a.at2 x 1.5"."""
-    match = None if os.path.exists(name) else _FACTOR.fullmatch(name)  # noqa: PTH110 - see `path_exists`
+    match = None if os.path.exists(name) else _FACTOR_PATTERN.fullmatch(name)  # noqa: PTH110 - see `path_exists`
     return (match[1], float(match[2])) if match else (name, 1.0)
 
 
@@ -205,7 +205,7 @@ def _unfold(name: str) -> list[str]:
 def _scale_files(name: str, line: int, row: list[str], file_columns: list[int], factor_column: int) -> Iterator[str]:
     """Yield the files in a row of a selection with their factor."""
     text = row[factor_column].strip() if len(row) > factor_column else ""
-    if not _FACTOR.fullmatch(f"- x {text}"):
+    if not _FACTOR_PATTERN.fullmatch(f"- x {text}"):
         raise RecordError(f"the scale factor must be a number; got {text!r}", path=name, line=line, value=text)
     for cell in (row[k].strip() for k in file_columns if len(row) > k and row[k].strip()):
         sibling = str(Path(name).parent / cell)

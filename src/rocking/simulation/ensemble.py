@@ -120,7 +120,7 @@ class ScalingLevels:
     @classmethod
     def from_levels(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> ScalingLevels:
         """Create scales from `levels` and `measure` as in `simulate_many`, or for unscaled motions."""
-        parsed = Measure.parse(measure, among=SCALING_MEASURES)
+        parsed = Measure.parse(measure, names=SCALING_MEASURES)
         if levels is None:
             if parsed.name != "factor":
                 raise OptionError("{} requires {}", "measure", "levels")

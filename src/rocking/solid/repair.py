@@ -63,10 +63,10 @@ def combine_surfaces(surfaces: Sequence[Surface]) -> Surface:
     return Surface(np.vstack([surface.vertices for surface in surfaces]), faces, repairs)
 
 
-def orient_surfaces(surfaces: Sequence[Surface], hollow: Sequence[bool]) -> list[Surface]:
+def orient_surfaces(surfaces: Sequence[Surface], is_hollow: Sequence[bool]) -> list[Surface]:
     """Turn the normals of closed surfaces outwards, except for cavities: pieces in a larger one with normals into it.
 
-    A cavity belongs to the surface around it, but to another one only if ``hollow`` is true. Surfaces may become
+    A cavity belongs to the surface around it, but to another one only if ``is_hollow``. Surfaces may become
     empty.
     """
     labels = [label_shells(surface.faces) for surface in surfaces]
@@ -75,7 +75,7 @@ def orient_surfaces(surfaces: Sequence[Surface], hollow: Sequence[bool]) -> list
     sizes, owner = np.abs(volumes), surface_of.copy()
     is_cavity = np.zeros(len(shells), bool)
     for n in np.argsort(-sizes, kind="stable"):  # larger pieces first, because they may be cavities
-        may_contain = (surface_of == surface_of[n]) | hollow[surface_of[n]]
+        may_contain = (surface_of == surface_of[n]) | is_hollow[surface_of[n]]
         may_enclose = (volumes * volumes[n] < 0.0) & (sizes > sizes[n]) & ~is_cavity & may_contain
         if enclosing := [m for m in np.flatnonzero(may_enclose) if surrounds(*shells[m][:2], *shells[n][:2])]:
             is_cavity[n], owner[n] = True, surface_of[min(enclosing, key=lambda m: sizes[m])]
@@ -202,11 +202,11 @@ class Moments(NamedTuple):
 
     amount: float  # volume or mass
     centre: Floats  # centre, shape (3,)
-    second: Floats  # integral of x x^T about the centre, shape (3, 3)
+    second_moment: Floats  # integral of x x^T about the centre, shape (3, 3)
 
     def compute_inertia(self) -> Floats:
         """Return the tensor of inertia about the centre divided by the amount, m^2: the trace of x x^T minus x x^T."""
-        mean = self.second / self.amount
+        mean = self.second_moment / self.amount
         return np.asarray(np.trace(mean) * np.eye(3) - mean)
 
 
@@ -241,7 +241,7 @@ def combine_moments(parts: Sequence[Moments], densities: Sequence[float]) -> Mom
     second = np.zeros((3, 3))
     for part, density, mass in zip(parts, densities, masses, strict=True):
         offset = part.centre - centre
-        second += density * part.second + mass * np.outer(offset, offset)
+        second += density * part.second_moment + mass * np.outer(offset, offset)
     return Moments(total, centre, second)
 
 

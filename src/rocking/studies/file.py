@@ -39,7 +39,7 @@ from rocking.inputs.declared import (
 from rocking.inputs.inventory import read_inventory
 from rocking.inputs.notes import list_motion_notes
 from rocking.inputs.pulses import find_family
-from rocking.inputs.toml import Tables
+from rocking.inputs.toml import TomlFile
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.records.components import separate_verticals
@@ -153,7 +153,7 @@ def read_study(path: str | Path) -> StudyFile:
     >>> read_study(file).product.shape
     (2, 3, 1, 320)
     """
-    tables = Tables(path)
+    tables = TomlFile(path)
     _check_tables(tables)
     blocks, scales = _read_bodies(tables), _read_scales(tables)
     motions, names, skipped = _load_motions(tables, scales)
@@ -167,7 +167,7 @@ def read_study(path: str | Path) -> StudyFile:
     return StudyFile(product, tuple(skipped), tuple(names))
 
 
-def _check_tables(tables: Tables) -> None:
+def _check_tables(tables: TomlFile) -> None:
     """Check table names, keys, and types of non-numeric values."""
     for table, content in tables.tables.items():
         if table not in SCHEMA:
@@ -190,7 +190,7 @@ def _check_tables(tables: Tables) -> None:
             raise StudyError("the table [{}] is missing", needed, path=str(tables.file))
 
 
-def _read_bodies(tables: Tables) -> Bodies:
+def _read_bodies(tables: TomlFile) -> Bodies:
     """Read the bodies of all combinations in [blocks], or of its CSV table."""
     entries = tables.table("blocks")
     if "csv" in entries:
@@ -223,7 +223,7 @@ def _read_bodies(tables: Tables) -> Bodies:
 
 
 def _create_objects(
-    tables: Tables,
+    tables: TomlFile,
     table: str,
     k: int,
     entries: Mapping[str, Any],
@@ -240,7 +240,7 @@ def _create_objects(
         return [create(dict(zip(axes, row, strict=True))) for row in itertools.product(*axes.values())]
 
 
-def _create_forces(tables: Tables, name: str, k: int) -> list[Any]:
+def _create_forces(tables: TomlFile, name: str, k: int) -> list[Any]:
     table = f"blocks.{name}s"
 
     def create_force(values: dict[str, Any]) -> Any:
@@ -250,14 +250,14 @@ def _create_forces(tables: Tables, name: str, k: int) -> list[Any]:
     return _create_objects(tables, table, k, tables.table(table, k), find_reader, create_force)
 
 
-def _create_pulses(tables: Tables, k: int) -> list[Motion]:
+def _create_pulses(tables: TomlFile, k: int) -> list[Motion]:
     entries, table = dict(tables.table("motions.pulses", k)), "motions.pulses"
     with tables.locating_errors(table, key="family", occurrence=k):
         family = find_family(str(entries.pop("family", "")))
     return _create_objects(tables, table, k, entries, family.find_reader, family.create_motion)
 
 
-def _create_stochastic_motions(tables: Tables, k: int) -> list[Motion]:
+def _create_stochastic_motions(tables: TomlFile, k: int) -> list[Motion]:
     table = "motions.stochastic"
 
     def create(values: dict[str, Any]) -> tuple[Motion, ...]:
@@ -267,7 +267,7 @@ def _create_stochastic_motions(tables: Tables, k: int) -> list[Motion]:
     return [*itertools.chain(*_create_objects(tables, table, k, tables.table(table, k), readers, create))]
 
 
-def _read_scales(tables: Tables) -> ScalingLevels:
+def _read_scales(tables: TomlFile) -> ScalingLevels:
     entries = tables.table("scales")
     measures = [name for name in _MEASURES if name in entries]
     if len(measures) > 1:
@@ -286,7 +286,7 @@ def _read_scales(tables: Tables) -> ScalingLevels:
         return ScalingLevels.from_levels(values, Measure(cast(MeasureName, name), **options))
 
 
-def _load_motions(tables: Tables, scales: ScalingLevels) -> tuple[list[Motion], list[str], list[str]]:
+def _load_motions(tables: TomlFile, scales: ScalingLevels) -> tuple[list[Motion], list[str], list[str]]:
     """Load the motions; return them, their records, and a sentence for each skipped record."""
     entries, folder = tables.table("motions"), tables.file.parent
     if "vertical" in entries and not entries.get("records"):
@@ -331,7 +331,7 @@ def _load_motions(tables: Tables, scales: ScalingLevels) -> tuple[list[Motion], 
 _READING_OPTIONS: Final = ("dt", "units", "baseline", "highpass")
 
 
-def _load_pairs(tables: Tables, paths: list[str]) -> list[Motion]:
+def _load_pairs(tables: TomlFile, paths: list[str]) -> list[Motion]:
     """Load the pairs of horizontal components, with vertical ones if the key is "own"."""
     entries = tables.table("motions")
     if "channel" in entries or entries.get("vertical", OWN) != OWN:
@@ -343,7 +343,7 @@ def _load_pairs(tables: Tables, paths: list[str]) -> list[Motion]:
         return [*records.load_pairs(paths, with_vertical="vertical" in entries, keep_going=keep_going, **options)]
 
 
-def _load_record(tables: Tables, path: str, *, are_defaults: bool) -> Motion:
+def _load_record(tables: TomlFile, path: str, *, are_defaults: bool) -> Motion:
     entries = tables.table("motions")
     options = {name: entries[name] for name in _READING_OPTIONS if name in entries}
     channel, vertical_name = (str(entries[name]) if name in entries else None for name in ("channel", "vertical"))

@@ -48,32 +48,32 @@ from rocking.records.formats.source import Line, Request, Source
 from rocking.records.units import SECOND, Unit, find_unit
 
 _END_OF_DATA: Final = re.compile(r"(?i)^\s*(/&|-*\s*end[ -]of[ -]data)")
-_STARTS: Final = ("%Y%m%d_%H%M%S.%f", "%Y/%m/%d-%H:%M:%S.%f", "%d/%m/%Y %H:%M:%S.%f", "%Y %m %d %H %M %S.%f")
+_START_FORMATS: Final = ("%Y%m%d_%H%M%S.%f", "%Y/%m/%d-%H:%M:%S.%f", "%d/%m/%Y %H:%M:%S.%f", "%Y %m %d %H %M %S.%f")
 #: Ratio of the peak of the numbers to the stated one that indicates another unit.
 _PEAK_RATIO: Final = 3.0
 _MAX_HEADER_LINES: Final = 400
-_BEARING: Final = re.compile(r"([NS])\s*(\d{1,2}(?:\.\d*)?)\s*([EW])\b")
-_DEGREES: Final = re.compile(r"(?ia)(\d{1,3}(?:\.\d*)?)\s*(?:deg|$)")
-_DIRECTIONS: Final = {"n": 0.0, "ns": 0.0, "n-s": 0.0, "north": 0.0, "e": 90.0, "ew": 90.0, "e-w": 90.0, "east": 90.0}
-_NUMERIC: Final = r"(?=.*\d)[\d \t.+EeDd-]+$"
+_BEARING_PATTERN: Final = re.compile(r"([NS])\s*(\d{1,2}(?:\.\d*)?)\s*([EW])\b")
+_DEGREES_PATTERN: Final = re.compile(r"(?ia)(\d{1,3}(?:\.\d*)?)\s*(?:deg|$)")
+_AZIMUTHS: Final = {"n": 0.0, "ns": 0.0, "n-s": 0.0, "north": 0.0, "e": 90.0, "ew": 90.0, "e-w": 90.0, "east": 90.0}
+_NUMERIC_PATTERN: Final = r"(?=.*\d)[\d \t.+EeDd-]+$"
 
 
 @functools.cache
 def _compile(pattern: str) -> re.Pattern[str]:
     r"""Return a pattern of `declared.toml`: `\s` is a blank within a line, NUMBER a number, and NUMERIC a row."""
-    text = pattern.replace("NUMERIC", _NUMERIC).replace("NUMBER", NUMBER).replace(r"\s", r"[^\S\n]")
+    text = pattern.replace("NUMERIC", _NUMERIC_PATTERN).replace("NUMBER", NUMBER).replace(r"\s", r"[^\S\n]")
     return re.compile(text, re.ASCII | re.IGNORECASE | re.MULTILINE)
 
 
 def find_azimuth(name: str) -> float | None:
     """Return the direction, degrees clockwise from north, of a component called "N10E", "90 Deg", "E-W", "HNE", ..."""
-    if match := _BEARING.match(name):
+    if match := _BEARING_PATTERN.match(name):
         angle = float(match[2]) if match[3] == "E" else -float(match[2])
         return (angle if match[1] == "N" else 180.0 - angle) % 360.0
-    if match := _DEGREES.match(name):
+    if match := _DEGREES_PATTERN.match(name):
         return float(match[1]) % 360.0
     word = name.split(" ")[0]
-    return _DIRECTIONS.get((word[-1] if re.fullmatch("[BCDEHS][HLN][NE]", word) else word).lower())
+    return _AZIMUTHS.get((word[-1] if re.fullmatch("[BCDEHS][HLN][NE]", word) else word).lower())
 
 
 class _Statement(NamedTuple):
@@ -225,7 +225,7 @@ class Header:
             return float(f"{duration / count:.6g}"), self.statements["duration"][0].offset
         if not steps:
             self._reject("the header states no sampling step", self.offset)
-        step, rounding, offset = min(steps, key=lambda each: each[1])
+        step, rounding, offset = min(steps, key=lambda item: item[1])
         for other, other_rounding, place in steps:
             if abs(step - other) > 1.01 * other_rounding + 1e-6 * step:
                 self._reject(f"the header states a sampling step of both {step:.6g} and {other:.6g} s", place)
@@ -302,9 +302,9 @@ class Header:
         form, number = self.form, self.find("number")
         name = form.component_names.get(self.find("name"), column or self.find("name"))
         ordinal = int(number) if number else self.ordinal + index
-        letter = self.find(f"azimuth_{name[:1].lower()}")
+        azimuth_text = self.find(f"azimuth_{name[:1].lower()}")
         event, magnitude, start = self.find("event"), self.find("magnitude"), None
-        for pattern in _STARTS:
+        for pattern in _START_FORMATS:
             with contextlib.suppress(ValueError):
                 start = datetime.strptime(f"{self.find('start')}+0000", f"{pattern}%z").timestamp()
                 start -= 3600.0 * float(self.find("zone", "0"))
@@ -312,7 +312,7 @@ class Header:
         return {
             "name": name or (f"channel {ordinal}" if form.has_several_channels else "acceleration"),
             "number": ordinal,
-            "azimuth": float(letter) if letter else find_azimuth(name),
+            "azimuth": float(azimuth_text) if azimuth_text else find_azimuth(name),
             "station": ".".join(filter(None, (self.find("network"), self.find("station")))),
             "event": f"{event}, magnitude {magnitude}" if magnitude else event,
             "start": start,

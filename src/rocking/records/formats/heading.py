@@ -29,7 +29,7 @@ _WORD: Final = re.compile(r"[^\W\d_]+")
 _SUFFIX: Final = re.compile(r"(?i)(?:(?<![^\W_])a|(?:acc|acel|beschl)[^\W_]*)_(?=([A-Za-z]\w{0,12})\b)")
 _BREAK: Final = re.compile(r"[\s_/,;:.-]+(?:in\s+)?")
 #: Line without content: a rule, or delimiters only.
-RULE: Final = re.compile(r"[-=_~+|\s]{3,}|#+|[,;\s]*")
+RULE_PATTERN: Final = re.compile(r"[-=_~+|\s]{3,}|#+|[,;\s]*")
 #: Possible unit, unlike the number in "channel (3)".
 _UNIT_LIKE: Final = re.compile(r".*(?:[^\W\d_]|[%°])")
 
@@ -73,7 +73,7 @@ def parse_heading(source: Source, end: int, count: int, delimiter: str) -> Headi
     lines: list[tuple[str, int]] = []
     for line in source.data[offset:end].split(b"\n"):
         text = _strip_comment_sign(line)
-        if not RULE.fullmatch(text):
+        if not RULE_PATTERN.fullmatch(text):
             lines.append((text, offset))
         offset += len(line) + 1
     texts = [text for text, _ in lines]

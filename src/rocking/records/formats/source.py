@@ -25,16 +25,16 @@ from rocking.records import catalogue
 from rocking.records.units import UNIT_NAMES, Unit, choose_unit, find_unit
 
 #: Largest accepted file, bytes, a hundred times the longest strong-motion records.
-SIZE_LIMIT = 512 * 2**20
+MAX_SIZE = 512 * 2**20
 
 #: Largest accepted file in an archive, bytes, because a small archive may unpack to any size.
-_MEMBER_LIMIT = 64 * 2**20
+_MAX_MEMBER_SIZE = 64 * 2**20
 
 #: Decoded length of header lines, which limits the cost of files without line ends.
-LINE_LIMIT = 512
+MAX_LINE_LENGTH = 512
 
-_CONTROL = bytes(c for c in range(32) if c not in b"\t\n")
-_VISIBLE = re.compile(rb"\S")
+_CONTROL_BYTES = bytes(c for c in range(32) if c not in b"\t\n")
+_VISIBLE_PATTERN = re.compile(rb"\S")
 _ZIP_MARK = b"PK\3\4"
 _ARCHIVE_ERRORS = (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error)
 #: Members of archives that are no records: folders, hidden files, documents and pictures.
@@ -44,7 +44,7 @@ _NO_RECORD = re.compile(r"(?i)/$|(?:^|/)(?:\.|__MACOSX)|\.(?:pdf|docx?|html?|png
 class Line(NamedTuple):
     """Line of a file."""
 
-    text: str  # text, cut at LINE_LIMIT
+    text: str  # text, cut at MAX_LINE_LENGTH
     start: int  # offset in the file
     next_start: int  # offset of the next line
 
@@ -71,7 +71,7 @@ class Source:
         """Return the line that starts at the offset `start`."""
         end = self.data.find(b"\n", start)
         end = len(self.data) if end < 0 else end
-        text = self.data[start : min(end, start + LINE_LIMIT)].decode("latin-1")
+        text = self.data[start : min(end, start + MAX_LINE_LENGTH)].decode("latin-1")
         return Line(text.rstrip(), start, min(end + 1, len(self.data)))
 
     def read_lines(self, start: int, count: int) -> list[Line]:
@@ -84,7 +84,7 @@ class Source:
 
     def find_first_line(self, start: int = 0) -> Line | None:
         """Return the first line from `start` that is not blank, or None."""
-        match = _VISIBLE.search(self.data, start)
+        match = _VISIBLE_PATTERN.search(self.data, start)
         return None if match is None else self.read_line(self.data.rfind(b"\n", 0, match.start()) + 1)
 
     def find_first_lines(self, count: int) -> list[Line]:
@@ -99,7 +99,7 @@ class Source:
     @cached_property
     def is_binary(self) -> bool:
         """Whether at least one byte in a hundred cannot occur in a text file."""
-        return len(self.data.translate(None, _CONTROL)) < 0.99 * len(self.data)
+        return len(self.data.translate(None, _CONTROL_BYTES)) < 0.99 * len(self.data)
 
     def error(self, message: str, offset: int | None = None, *arguments: str, value: object = None) -> RecordError:
         """Return an error with this message about the file's line at an offset."""
@@ -130,11 +130,11 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
     """Read a whole file, or the rest of an open one."""
     name = name_path(path)
     try:
-        name, raw = _unpack(name, path.read(SIZE_LIMIT + 1) if hasattr(path, "read") else _read_bytes(name))
+        name, raw = _unpack(name, path.read(MAX_SIZE + 1) if hasattr(path, "read") else _read_bytes(name))
     except (OSError, ValueError, *_ARCHIVE_ERRORS) as error:
         raise unreadable_file_error(name, error) from error
-    if len(raw) > SIZE_LIMIT:
-        limit = SIZE_LIMIT // 2**20
+    if len(raw) > MAX_SIZE:
+        limit = MAX_SIZE // 2**20
         raise RecordError(f"this file is larger than {limit} MiB; cut the record into smaller files", path=name)
     data = _normalise_text(_read_workbook(name, raw) if _is_workbook(raw) else raw)
     if not data.strip():
@@ -188,9 +188,9 @@ def _extract(raw: bytes, member: str) -> bytes:
     with zipfile.ZipFile(io.BytesIO(raw)) as archive:
         if member in archive.namelist():
             with archive.open(member) as file:
-                content = file.read(_MEMBER_LIMIT + 1)
-            if len(content) > _MEMBER_LIMIT:
-                limit = _MEMBER_LIMIT // 2**20
+                content = file.read(_MAX_MEMBER_SIZE + 1)
+            if len(content) > _MAX_MEMBER_SIZE:
+                limit = _MAX_MEMBER_SIZE // 2**20
                 raise RecordError(f"this file in an archive is larger than {limit} MiB; unpack it", path=member)
             return content
     for match in re.finditer(r"(?i)\.zip/", member):
@@ -216,7 +216,7 @@ def _read_workbook(name: str, raw: bytes) -> bytes:
     text = io.StringIO()
     try:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
-            if sum(info.file_size for info in archive.infolist()) > _MEMBER_LIMIT:
+            if sum(info.file_size for info in archive.infolist()) > _MAX_MEMBER_SIZE:
                 raise ValueError
         workbook = openpyxl.load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
         for row in workbook.worksheets[0].iter_rows(values_only=True):
@@ -238,7 +238,7 @@ def _read_bytes(name: str) -> bytes:
         raise RecordError(f"{text}; choose a record file", path=name)
     with open(name, "rb") as file:  # noqa: PTH123
         # A read allocates as much memory as requested.
-        return file.read(min(status.st_size, SIZE_LIMIT) + 1)
+        return file.read(min(status.st_size, MAX_SIZE) + 1)
 
 
 def _normalise_text(raw: bytes) -> bytes:

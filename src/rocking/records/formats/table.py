@@ -33,7 +33,7 @@ from rocking.records.formats.channel import (
     fit_even_step,
     resolve_timing,
 )
-from rocking.records.formats.heading import RULE, Heading, parse_heading
+from rocking.records.formats.heading import RULE_PATTERN, Heading, parse_heading
 from rocking.records.formats.numbers import (
     NUMBER,
     StatedCount,
@@ -50,9 +50,9 @@ _DELIMITERS: Final = {",": "a comma", ";": "a semicolon", " ": "a blank"}
 #: Largest number of heading lines.
 HEADING_LINES: Final = 1000
 #: Longest row of numbers. Longer lines are rejected before splitting.
-_ROW_LIMIT: Final = 1024
+_MAX_ROW_LENGTH: Final = 1024
 #: Text after a longer piece on its line may not be seen.
-_LONG_LINE: Final = 300
+_LONG_LINE_LENGTH: Final = 300
 
 #: Error values of spreadsheets after a #.
 _ERROR_VALUES: Final = r"(?:(?:n/?a|nv)(?!\w)|div/0!|value!|ref!|num!|name\?|null!|wert!|zahl!)"
@@ -76,7 +76,7 @@ _STEP_STATEMENT: Final = re.compile(
     re.IGNORECASE,
 )
 #: Time of the day at the start of a row, possibly after a date, and its name in a heading.
-_CLOCK: Final = re.compile(
+_CLOCK_PATTERN: Final = re.compile(
     rb"(?m)^[ \t\"]*(?:(\d{4})[-/](\d\d?)[-/](\d\d?)[T ])?(\d{1,2}):(\d\d):(\d\d)([.,]\d+)?Z?\"?(?=[ \t,;])"
 )
 _CLOCK_HEADING: Final = re.compile(rb"(?i)[(\[](?:[ymd]+[-/][ymd]+[-/][ymd]+[t ])?hh:mm:ss[.\w]*[)\]]")
@@ -92,7 +92,7 @@ class _TextTable(NamedTuple):
     delimiter: str  # sign between the numbers of a row
     column_count: int
     start: int  # offset of the first row
-    damaged: tuple[bytes, int] | None  # invalid number in a row before it, and the offset of that row
+    damaged_token: tuple[bytes, int] | None  # invalid number in a row before it, and the offset of that row
     heading: Heading  # names and units of the columns
 
     def _is_ambiguous(self, row: str) -> bool:
@@ -117,8 +117,8 @@ class _TextTable(NamedTuple):
     def read(self, request: Request) -> list[Channel]:
         """Return the channels of the file: one, unless a heading names several."""
         source = self.source
-        if self.damaged is not None:
-            token, offset = self.damaged
+        if self.damaged_token is not None:
+            token, offset = self.damaged_token
             text = f"{token[:40].decode('latin-1')!r} is not a number, but this line resembles a row of numbers"
             raise source.error(f"{text}; correct it, or begin the line with # if it is a heading", offset)
         row = source.read_line(self.start).text.strip()
@@ -222,7 +222,7 @@ class _TextTable(NamedTuple):
         for raw in stream:
             line = raw.strip()
             if line and not _COMMENT.match(line):
-                if len(line) > _ROW_LIMIT:
+                if len(line) > _MAX_ROW_LENGTH:
                     text = f"this row is {len(line)} characters long, too long for a row of numbers; correct it"
                     raise self.source.error(text, offset)
                 if tokens := line.translate(self.translation).split():
@@ -276,7 +276,7 @@ def _read_wrapped(table: _TextTable, request: Request) -> list[Channel]:
 
 def _convert_clock_times(source: Source) -> Source:
     """Return a file with the seconds since midnight instead of times such as 2024-01-31T23:59:59.99 or 23:59:59.99."""
-    first = _CLOCK.search(source.data)
+    first = _CLOCK_PATTERN.search(source.data)
     if first is None:
         return source
     first_day = _number_day(first)
@@ -286,7 +286,7 @@ def _convert_clock_times(source: Source) -> Source:
         whole = 86400 * (_number_day(match) - first_day) + 3600 * hours + 60 * minutes + seconds
         return b"%d" % whole + (match[7] or b"")
 
-    return replace(source, data=_CLOCK_HEADING.sub(b"(s)", _CLOCK.sub(convert, source.data)))
+    return replace(source, data=_CLOCK_HEADING.sub(b"(s)", _CLOCK_PATTERN.sub(convert, source.data)))
 
 
 def _number_day(match: re.Match[bytes]) -> int:
@@ -331,7 +331,7 @@ def _is_comment(line: Line) -> bool:
 
 def _drop_empty_lines(lines: Sequence[Line]) -> list[Line]:
     """Return the lines that contain more than a comment."""
-    return [line for line in lines if not _is_comment(line) and not RULE.fullmatch(line.text)]
+    return [line for line in lines if not _is_comment(line) and not RULE_PATTERN.fullmatch(line.text)]
 
 
 def _split_row(line: Line, translation: bytes) -> list[bytes]:
@@ -347,7 +347,7 @@ def _find_damaged_token(text: str, tokens: list[bytes], columns: int, *, has_nam
     invalid = [token for token in tokens if parse_token(token) is None]
     numbers = [token for token in tokens if parse_token(token) is not None]
     is_alike = all(_LIKE_NUMBER.fullmatch(token.decode("latin-1")) for token in invalid)
-    is_row = is_alike and bool(numbers or len(tokens) == columns or len(text) > _LONG_LINE)
+    is_row = is_alike and bool(numbers or len(tokens) == columns or len(text) > _LONG_LINE_LENGTH)
     if numbers and len(tokens) == columns and not is_row:
         is_plausible = tokens[0] in numbers or any(b"." in number for number in numbers)
         is_row = has_names or (is_plausible and re.search(r"[,;\t]", text.strip()) is not None)
