@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 import rocking
 from rocking.analysis.levels import find_boundaries
-from rocking.analysis.overturning import PULSES, mode_name, overturning_map
+from rocking.analysis.overturning import PULSES, describe_mode, overturning_map
 from rocking.block import Blocks
 from rocking.engine.schemes import Certified
 from rocking.engine.tasks import Setup, simulate_each
@@ -75,7 +75,7 @@ def test_a_second_region_overturns_after_one_impact_with_safety_above_it():
     for k in range(3):
         modes, _ = sequence(dataset, k)
         assert modes == [-3, -2, -1, 1, -1, 0] or modes == [-3, -1, 1, -1, 0]
-    assert [mode_name(mode) for mode in modes[-3:]] == [
+    assert [describe_mode(mode) for mode in modes[-3:]] == [
         "overturns after 1 impact",
         "rocks until the pulse is over",
         "overturns without impact",
@@ -125,10 +125,10 @@ def test_a_block_that_overturns_after_a_rest_is_told_so():
     assert response.events["kind"].tolist() == ["uplift", "rest", "uplift", "overturn"]
     assert len(response.impacts) > 0
     assert dataset.data.mode.values[0, 0] == -4
-    assert mode_name(-4) in dataset.summary()
+    assert describe_mode(-4) in dataset.summary()
     assert "3 or less" in dataset.summary()
     (legend,) = dataset.plot().legends
-    assert [text.get_text() for text in legend.get_texts()] == [mode_name(-4)]
+    assert [text.get_text() for text in legend.get_texts()] == [describe_mode(-4)]
 
 
 def test_a_mirrored_two_sided_block_under_a_mirrored_pulse():

@@ -2,7 +2,7 @@ from .critical import CriticalScale
 from .curve import FragilityCurve
 from .efficiency import MeasureComparison
 from .incremental import IncrementalDynamicAnalysis
-from .overturning import OverturningMap, OverturningMode, mode_name
+from .overturning import OverturningMap, OverturningMode, describe_mode
 from .probit import Goodness, Probit
 from .risk import Rate, Risk, Survival
 from .spectrum import RockingSpectrum
@@ -22,5 +22,5 @@ __all__ = [
     "RockingSpectrum",
     "Survey",
     "Survival",
-    "mode_name",
+    "describe_mode",
 ]

@@ -52,7 +52,7 @@ class OverturningMode(IntEnum):
 
     See Also
     --------
-    rocking.analysis.mode_name : Describe a mode in words.
+    rocking.analysis.describe_mode : Describe a mode in words.
 
     Examples
     --------
@@ -221,7 +221,7 @@ def overturning_map(
     return OverturningMap(_combine_modes(levels, ratios, modes, peaks, brackets, attributes))
 
 
-def mode_name(mode: int) -> str:
+def describe_mode(mode: int) -> str:
     """Return the description of an `OverturningMode` or of a number of impacts before overturning.
 
     Parameters
@@ -241,7 +241,7 @@ def mode_name(mode: int) -> str:
 
     Examples
     --------
-    >>> mode_name(-2), mode_name(0), mode_name(1)
+    >>> describe_mode(-2), describe_mode(0), describe_mode(1)
     ('rests before the pulse is over', 'overturns without impact', 'overturns after 1 impact')
     """
     if mode <= 0:
@@ -286,7 +286,7 @@ class OverturningMap(DatasetResult):
     >>> import rocking
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> result = rocking.overturning_map(block, "half-sine", amplitudes=[0.5, 1.5, 2.5], frequencies=[2.0])
-    >>> [rocking.analysis.mode_name(mode) for mode in result.data.mode.values[:, 0]]
+    >>> [rocking.analysis.describe_mode(mode) for mode in result.data.mode.values[:, 0]]
     ['no uplift', 'rocks until the pulse is over', 'overturns without impact']
     """
 
@@ -306,7 +306,7 @@ class OverturningMap(DatasetResult):
         modes, counts = np.unique(self.data.mode, return_counts=True)
         percents = 100.0 * counts / self.data.mode.size
         shares = [
-            (mode_name(int(mode)), f"{percent:.1f} %" if percent >= 0.1 else "below 0.1 %")
+            (describe_mode(int(mode)), f"{percent:.1f} %" if percent >= 0.1 else "below 0.1 %")
             for mode, percent in zip(modes, percents, strict=True)
         ]
         rows = [(float(ratio), self._describe_lowest(k)) for k, ratio in enumerate(self.data.frequency)]
@@ -331,7 +331,7 @@ class OverturningMap(DatasetResult):
             **{name: self.data.attrs[name] for name in (add_unit("alpha", "rad"), "restitution")},
             "model": self.data.model,
             "rtol": self.data.rtol,
-            "modes": {str(mode): mode_name(int(mode)) for mode in np.unique(self.data.mode)},
+            "modes": {str(mode): describe_mode(int(mode)) for mode in np.unique(self.data.mode)},
             "frequency": self.data.frequency.values,
             "amplitude": self.data.amplitude.values,
             "mode": self.data.mode.values,
@@ -350,7 +350,7 @@ class OverturningMap(DatasetResult):
             y_range=(float(data.amplitude[0]), float(data.amplitude[-1])),
             edges=[data.boundary_amplitude.values[is_column] for is_column in columns],
             regions=[[modes[0, k], *data.mode_above.values[is_column]] for k, is_column in enumerate(columns)],
-            names={int(mode): mode_name(int(mode)) for mode in np.union1d(modes, data.mode_above.values)},
+            names={int(mode): describe_mode(int(mode)) for mode in np.union1d(modes, data.mode_above.values)},
             x_label="2πf/p, with the frequency f of the pulse",
             y_label="amplitude over the smallest that lifts the block",
             title=title or escape_dollars(f"{self.data.pulse_name}, {self._proportion_text}, {data.model} model"),

@@ -81,7 +81,7 @@ class BoundReached:
     ----------
     name, end : str
         Estimate and bound, "lower" or "upper".
-    bound, wider : float
+    bound, wider_bound : float
         Bound and suggested wider bound, in the parameter's unit.
     share : float
         Share of the posterior in the outermost 5 % of the range.
@@ -94,15 +94,15 @@ class BoundReached:
     Examples
     --------
     >>> from rocking.calibration import BoundReached
-    >>> reached = BoundReached("alpha", "upper", bound=0.3, wider=0.6, share=0.4)
-    >>> f"{reached.name}: widen the {reached.end} bound from {reached.bound} to {reached.wider} rad"
+    >>> reached = BoundReached("alpha", "upper", bound=0.3, wider_bound=0.6, share=0.4)
+    >>> f"{reached.name}: widen the {reached.end} bound from {reached.bound} to {reached.wider_bound} rad"
     'alpha: widen the upper bound from 0.3 to 0.6 rad'
     """
 
     name: str
     end: str
     bound: float
-    wider: float
+    wider_bound: float
     share: float
 
     def __str__(self) -> str:
@@ -110,7 +110,7 @@ class BoundReached:
         return (
             f"{self.name} reaches its {self.end} bound of {bound}: {100 * self.share:.0f} % of the posterior lies in "
             f"the outermost {100 * _EDGE_SHARE:.0f} % of the range, so that the bound sets the {self.end} end of the "
-            f"interval; unless this bound is certain, set that of {self.name.partition('_')[0]} to {self.wider:g}"
+            f"interval; unless this bound is certain, set that of {self.name.partition('_')[0]} to {self.wider_bound:g}"
         )
 
 
@@ -189,6 +189,6 @@ def list_bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ..
             share = float(is_near.mean())
             # Bounds at the largest possible value cannot be widened.
             if share > 0.05 and bound < math.log(max_value) - 1e-9:
-                wider = min(factor * math.exp(bound), max_value)
-                bounds_reached.append(BoundReached(name, end, math.exp(bound), wider, share))
+                wider_bound = min(factor * math.exp(bound), max_value)
+                bounds_reached.append(BoundReached(name, end, math.exp(bound), wider_bound, share))
     return tuple(bounds_reached)

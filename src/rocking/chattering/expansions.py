@@ -150,20 +150,20 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     excess = check_lifting_amplitude(a) - 1.0
     frequency = require_scalar(check_frequency(omega), "omega")
     restitution = require_scalar(check_lossy_restitution(eta), "eta")
-    pairs = 64
-    while (count := write_eq65_terms(restitution, *(terms := np.zeros((2, pairs))))) == pairs:
-        pairs *= 2
-    table = np.zeros(2 * count, CYCLE_DTYPE)
-    is_even = np.arange(2 * count) % 2 == 0
-    table["n"] = np.arange(2 * count)
+    pair_count = 64
+    while (term_count := write_eq65_terms(restitution, *(terms := np.zeros((2, pair_count))))) == pair_count:
+        pair_count *= 2
+    table = np.zeros(2 * term_count, CYCLE_DTYPE)
+    is_even = np.arange(2 * term_count) % 2 == 0
+    table["n"] = np.arange(2 * term_count)
     table["sign"] = np.where(is_even, -1, 1)
     table["order"] = np.where(is_even, 1, 3)
-    table["term"] = terms[:, :count].T.ravel() / frequency
+    table["term"] = terms[:, :term_count].T.ravel() / frequency
     table["interval"] = table["term"] * np.sqrt(excess) ** table["order"]
     table["time"] = np.cumsum(table["interval"])
     table["phase"] = frequency * table["time"] + math.asin(1.0 / (1.0 + excess))
     # In these units an arc of the second side lasts as long as its initial speed, which is conserved.
-    initial_speeds = np.repeat(terms[1, :count], 2)
+    initial_speeds = np.repeat(terms[1, :term_count], 2)
     speeds = np.where(is_even, initial_speeds / restitution, initial_speeds)
     table["speed_before"] = speeds * np.float64(excess) ** 1.5 / frequency
     table["speed_after"] = restitution * table["speed_before"]

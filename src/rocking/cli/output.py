@@ -51,9 +51,9 @@ class OutputOptions(PrintOptions):
 
 def write_results(folder: Path, *, figures: Mapping[str, Callable[[], Figure]], result: Mapping[str, Any]) -> None:
     """Write named figures (PNG and PDF) and a result (JSON) into a folder."""
-    for stem, draw in figures.items():
+    for stem, draw_figure in figures.items():
         with skip_on_error(f"{stem}.png and {stem}.pdf"):
-            figure = draw()
+            figure = draw_figure()
             write_figure(folder / f"{stem}.png", figure, dpi=160)
             write_figure(folder / f"{stem}.pdf", figure)
     write_text(folder / "result.json", to_json(result) + "\n")  # last: marks a complete folder

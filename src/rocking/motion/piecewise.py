@@ -291,9 +291,9 @@ def check_samples(acceleration: ArrayLike) -> Floats:
     values = _convert_array(acceleration, "accelerations", 1)
     if len(values) < 2:
         raise MotionError(f"a motion requires at least two samples; got {len(values)}")
-    fault_indices = np.flatnonzero(~np.isfinite(values))
-    if len(fault_indices):
-        place = f"{values[fault_indices[0]]} at sample {fault_indices[0]}"
+    faults = np.flatnonzero(~np.isfinite(values))
+    if len(faults):
+        place = f"{values[faults[0]]} at sample {faults[0]}"
         raise MotionError(f"every sample of a motion must be a finite number; got {place}")
     return values
 

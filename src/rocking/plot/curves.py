@@ -197,13 +197,13 @@ class SpectrumCurves(NamedTuple):
     label : legend label; none if empty
     singles (motions, points) : normalised peak rotation of every motion
     fractiles (fractiles, points) : their fractiles; the middle one is drawn thickest
-    overturned (points,) : fraction of the motions that overturn the block
+    overturned_share (points,) : fraction of the motions that overturn the block
     """
 
     label: str
     single_curves: Floats
     fractiles: Floats
-    overturned: Floats
+    overturned_share: Floats
 
 
 def draw_spectrum(
@@ -236,7 +236,7 @@ def draw_spectrum(
                 fractile = curve.fractiles[[*fractiles].index(share)]
                 _draw_peaks(peak_axes, x, curve.single_curves[0] if len(motions) == 1 else fractile, width, style)
             for panel in share_axes:
-                panel.step(x, curve.overturned, where="mid", linewidth=1.2, **style)
+                panel.step(x, curve.overturned_share, where="mid", linewidth=1.2, **style)
         if len(labelled) < len(curves):
             peak_axes.plot([], [], linestyle="none", label=f"({len(labelled)} of {len(curves)} named)")
         if len(motions) > 1:

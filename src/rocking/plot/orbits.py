@@ -80,9 +80,9 @@ def draw_branches(
         for is_branch, name, style in ((stable, "stable", _STABLE_STYLE), (~stable, "unstable", _UNSTABLE_STYLE)):
             # Dashes extend to the points where solid lines begin.
             is_joined = is_branch | np.append(is_branch[1:], False) | np.insert(is_branch[:-1], 0, False)
-            mask = is_branch if name == "stable" else is_joined
+            is_shown = is_branch if name == "stable" else is_joined
             if np.any(is_branch & ~np.isnan(values)):
-                axes.plot(np.where(mask, values, np.nan), np.where(mask, heights, np.nan), label=name, **style)
+                axes.plot(np.where(is_shown, values, np.nan), np.where(is_shown, heights, np.nan), label=name, **style)
         for kind in dict.fromkeys(name for name, _, _ in marks):
             points = np.array([(value, height) for name, value, height in marks if name == kind])
             axes.plot(*points.T, marker=_MARKERS.get(kind, _OTHER_MARKER), label=kind, **_BIFURCATION_STYLE)

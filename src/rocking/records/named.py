@@ -117,7 +117,7 @@ def correct_motion(name: str, original: Motion, request: Request, *, is_raw: boo
     """Return a motion without its baseline and high-pass filtered, with a note on the change of the peak."""
     motion = remove_baseline(original, request.baseline, request.highpass, is_raw=is_raw)
     if motion is not original:
-        texts = [f"{each.pga:.4g} m/s^2 ({each.pga / STANDARD_GRAVITY:.4g} g)" for each in (original, motion)]
+        texts = [f"{item.pga:.4g} m/s^2 ({item.pga / STANDARD_GRAVITY:.4g} g)" for item in (original, motion)]
         note(f"{name}: {' and '.join(motion.history)}, which changes the peak acceleration from {' to '.join(texts)}")
     return motion
 

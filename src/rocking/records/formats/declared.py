@@ -107,8 +107,8 @@ class Format:
         """Return the format if each of its marks is found."""
         lines = source.find_first_lines(self.mark_line_count)
         text = "\n".join(line.text for line in lines)
-        mark, *others = [_compile(pattern).search(text) for pattern in self.marks]
-        if mark is None or None in others:
+        mark, *other_matches = [_compile(pattern).search(text) for pattern in self.marks]
+        if mark is None or None in other_matches:
             return None
         line = lines[text.count("\n", 0, mark.start())]
         reason = f"line {source.find_line_number(line.start)} reads {mark[0].splitlines()[0].strip()!r}"
@@ -321,7 +321,7 @@ class Header:
 
     def find_peaks(self, count: int, unit: Unit) -> list[float]:
         """Return the stated peaks of this many components, m/s^2, or 0."""
-        peaks = [[abs(float(number)) for number in re.findall(NUMBER, each.text)] for each in self.statements["peak"]]
+        peaks = [[abs(float(number)) for number in re.findall(NUMBER, item.text)] for item in self.statements["peak"]]
         if len(peaks) == 1 < count:
             peaks = [[number] for number in peaks[0]]
         peak_unit = find_unit(self.find("peak_units")) or unit
