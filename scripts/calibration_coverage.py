@@ -79,7 +79,7 @@ def drawn(count: int, two_sided: bool) -> Iterator[DataSet]:
     """Draw so many truths, and pass over those whose outcomes are all the same."""
     space = Space.from_bounds(**BOUNDS, two_sided=two_sided)
     rng = np.random.default_rng(two_sided)
-    truths = population.draw_dispersions(space, space.sample_quasi_randomly(count, rng), rng)
+    truths = population.extend_to_populations(space, space.sample_quasi_randomly(count, rng), rng)
     for seed, truth in enumerate(truths[:, None]):
         motions = tests(rng)
         overturned = outcomes(space, truth, motions, rng)

@@ -226,7 +226,7 @@ def judged_row(tests, predicted, found):
         for score in (found.brier, found.log_loss)
         for value, error in ((score.value, score.error), (score.skill, score.skill_error))
     ]
-    return tests, predicted, *cells, f"{found.reliability_chance:.2g}"
+    return tests, predicted, *cells, f"{found.reliability_p_value:.2g}"
 
 
 def small_series(file):

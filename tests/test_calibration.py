@@ -296,7 +296,7 @@ def test_the_posterior_is_that_of_brute_force(threshold_evidence):
     drawn = sample_posterior(evidence, 512, 4, np.random.default_rng(0))
     rng = np.random.default_rng(1)
     space = evidence.candidates.space
-    prior = searching.draw_dispersions(space, space.sample_quasi_randomly(8000, rng), rng)
+    prior = searching.extend_to_populations(space, space.sample_quasi_randomly(8000, rng), rng)
     likelihood = np.exp(evidence.log_likelihoods(prior))
     weights = likelihood / likelihood.sum()
     mean = weights @ prior
@@ -337,7 +337,7 @@ def test_shares_are_sums_over_weighted_candidates(threshold_evidence):
     """In single precision, against double precision without leaving anything out."""
     evidence, _ = threshold_evidence
     rng = np.random.default_rng(6)
-    populations = searching.draw_dispersions(evidence.candidates.space, evidence.candidates.points[:50], rng)
+    populations = searching.extend_to_populations(evidence.candidates.space, evidence.candidates.points[:50], rng)
     centre, dispersion = searching.split_populations(populations)
     apart = (evidence.candidates.points - centre[:, None]) / dispersion[:, None]
     weights = np.exp(-0.5 * (apart**2).sum(axis=2) + evidence.candidates.log_weights)

@@ -133,7 +133,7 @@ def test_a_figure_shows_any_number_of_curves_and_names_some_of_many(spectrum):
         named = [text.get_text() for text in found.legends[0].get_texts() if "alpha" in text.get_text()]
         assert len(named) == min(count, 8)
         assert named[0].startswith("alpha = 0.1 ") and named[-1].startswith("alpha = 0.3 ")
-    with pytest.raises(rocking.errors.OptionError, match="against"):
+    with pytest.raises(rocking.errors.OptionError, match="abscissa"):
         spectrum.plot(abscissa="height")
 
 
