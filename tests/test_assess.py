@@ -137,7 +137,7 @@ def test_weights_of_one_reproduce_the_curve_and_the_rate(assessment):
         ({"levels": 1}, "levels must be"),
         ({"confidence": 2.0}, "confidence must be"),
         ({"years": -1.0}, "years must be"),
-        ({"samples": 1}, "samples must be"),
+        ({"sample_count": 1}, "sample_count must be"),
         ({"measure": "pgv", "hazard": HAZARD}, "must have the same measure"),
         ({"friction": 0.5, "blocks": rocking.Block.one_sided(width=0.4, height=4.0)}, "no object can be assessed"),
         ({"motions": rocking.Motion.from_samples([0.0, 0.0], dt=0.01)}, "no motion can be scaled"),
@@ -182,7 +182,7 @@ def test_an_uncertain_object_is_sampled(tmp_path):
     path.write_text("name,width,height\nknown,0.24,1.1\nuncertain,0.24 +- 0.03,1.1\n")
     inventory = rocking.read_inventory(path)
     found = {item.name: item for item in assess(inventory, MOTIONS, levels=10, sample_count=20).objects}
-    assert (found["known"].samples, found["uncertain"].samples) == (1, 20)
+    assert (found["known"].sample_count, found["uncertain"].sample_count) == (1, 20)
     assert found["uncertain"].curve.dispersion > found["known"].curve.dispersion
     pooled = rocking.fragility(inventory.sample(1, 20), MOTIONS, levels=found["uncertain"].levels, polarity="both")
     assert found["uncertain"].curve.median == pooled.curves[0].median

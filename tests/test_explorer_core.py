@@ -22,7 +22,7 @@ from rocking.explorer.code import case_as_command, case_as_python, map_as_python
 from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import block_to_texts, read_case
 from rocking.explorer.motions import create_pulse, motion_to_texts
-from rocking.explorer.parameters import DEFAULT, QUANTITIES
+from rocking.explorer.parameters import DEFAULT_TEXTS, QUANTITIES
 from rocking.explorer.payload import pack
 from rocking.explorer.periodic import read_sweep
 from rocking.explorer.simulated import describe_outcome, thin_line
@@ -148,7 +148,8 @@ def test_a_vertical_component_is_a_channel_of_the_same_file(tmp_path, monkeypatc
 def test_a_vertical_component_that_cannot_be_is_answered(texts, says):
     with pytest.raises(RockingError, match=says):
         read_case(
-            {"width": "0.24", "height": "1.1", "motion": DEFAULT["motion"], "vertical": "ridgecrest-clc-up"} | texts,
+            {"width": "0.24", "height": "1.1", "motion": DEFAULT_TEXTS["motion"], "vertical": "ridgecrest-clc-up"}
+            | texts,
             UploadStore(),
         )
 

@@ -16,7 +16,7 @@ from rocking import dynamics
 from rocking.plot.curves import (
     FragilityLine,
     HazardLine,
-    Parameter,
+    ParameterEstimate,
     RiskLine,
     ScaledMotion,
     SpectrumCurves,
@@ -31,7 +31,7 @@ from rocking.plot.curves import (
     draw_survival,
 )
 from rocking.plot.maps import draw_basins, draw_outcome_map, draw_regions, draw_rose
-from rocking.plot.orbits import draw_bifurcation, draw_branches, draw_orbit, render_intervals
+from rocking.plot.orbits import draw_bifurcation, draw_branches, draw_intervals, draw_orbit
 
 COLUMN, PAGE = 86.0 / 25.4, 174.0 / 25.4
 LONG = "rectangular block, 0.24 m x 1.1 m, restitution = 0.9318234567890123, under ridgecrest-clc-090, nonlinear model"
@@ -125,14 +125,14 @@ def outcomes_of(**options):
 
 def intervals_of(count=60, **options):
     intervals = 0.5 * 0.9 ** np.arange(count) * np.where(np.arange(count) % 2, 0.1, 1.0)
-    return render_intervals(intervals=intervals, eta=0.9, **options)
+    return draw_intervals(intervals=intervals, eta=0.9, **options)
 
 
 def trials_of(sides=2, **options):
     rng = np.random.default_rng(1)
     probabilities, values = rng.uniform(size=80), np.exp(rng.normal(size=(50, sides)))
     names = ("p (rad/s)", "alpha (rad)", "restitution")
-    parameters = [Parameter(name, values, np.array([[1.0, 0.5, 2.0]] * sides), (0.1, 9.0)) for name in names]
+    parameters = [ParameterEstimate(name, values, np.array([[1.0, 0.5, 2.0]] * sides), (0.1, 9.0)) for name in names]
     fell = probabilities > rng.uniform(size=80)
     weights = np.full(50, 0.02)
     return draw_outcomes(

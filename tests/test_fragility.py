@@ -388,7 +388,7 @@ def test_outcomes_without_a_best_lognormal_are_refused_in_one_sentence(intensity
         ({"intensity": [1.0, -2.0, 3.0]}, "intensity"),
         ({"intensity": []}, "intensity"),
         ({"exceedance_counts": [0, 1]}, "exceedance_counts"),
-        ({"exceedance_counts": [0, 2, 1]}, "trial_counts"),
+        ({"exceedance_counts": [0, 2, 1]}, "trials"),
         ({"exceedance_counts": [0.5, 1, 1]}, "whole"),
         ({"trial_counts": 0}, "trial_counts"),
         ({"clusters": [1, 2]}, "clusters"),

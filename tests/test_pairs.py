@@ -240,7 +240,7 @@ def test_a_study_of_pairs_counts_the_larger_response(pairs: tuple[Motion, ...], 
     assert (curve.median, curve.dispersion) == pytest.approx((direct.median, direct.dispersion), rel=1e-9)
     table = again.block_fragilities(measure=ROTATED, larger=True).data
     assert float(table["median"][0, 0]) == pytest.approx(direct.median, rel=1e-9)
-    assert int(table.outcomes[0, 0]) == 3 * len(LEVELS)
+    assert int(table.trial_count[0, 0]) == 3 * len(LEVELS)
 
 
 def test_commands_take_pairs(run: Callable[..., tuple[int, str, str]]) -> None:

@@ -256,7 +256,7 @@ HEADERS = {
     "dispersion_of_all",
     ("MeasureComparison", "intensities"): f"measure,motion,block,unit,{PULSES},intensity",
     ("BlockTable", "blocks"): "limit_state,block,p_rad_s,alpha_rad,restitution,"
-    "median_m_s2,median_lower_m_s2,median_upper_m_s2,dispersion,dispersion_lower,dispersion_upper,exceeded,outcomes,"
+    "median_m_s2,median_lower_m_s2,median_upper_m_s2,dispersion,dispersion_lower,dispersion_upper,exceedance_count,trial_count,"
     "fault",
     ("ChatteringMap", "outcomes"): "a,omega,outcome,complete,uplift_s,rest_s,lower_s,upper_s,rests,overturned",
 }

@@ -23,7 +23,7 @@ from rocking.kernels import library, state
 from rocking.simulation.simulate import compute_response
 
 CASES = 1000
-KINDS = (*standalone.PULSES, "sine", "tilt", *standalone.RECORDS)
+KINDS = (*standalone.PULSE_NAMES, "sine", "tilt", *standalone.RECORD_NAMES)
 
 #: Outcomes of cases, as the workers of the page compute them.
 OUTCOMES = """async (cases) => {
@@ -105,7 +105,7 @@ def simulate_case(case, change=1.0):
     initial = (case["tilt"] * change, 0.0)
     if case["tilt"]:
         return compute_response(block, None, case["model"], scheme, None, initial)
-    if kind in standalone.RECORDS:
+    if kind in standalone.RECORD_NAMES:
         motion = rocking.records.load(kind)
         amplitude /= motion.pga
     elif kind == "sine":

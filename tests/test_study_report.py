@@ -206,7 +206,7 @@ def test_outcomes_are_counted_for_each_block_by_its_own_polarities(tmp_path, ord
     )
     study.run()
     found, once = study.block_fragilities(), len(MOTIONS) * len(LEVELS)
-    assert found.data.outcomes.values.tolist() == [[once * (1 + k) for k in order]]
+    assert found.data.trial_count.values.tolist() == [[once * (1 + k) for k in order]]
 
 
 def test_a_block_that_no_curve_fits_says_why(tmp_path):
