@@ -295,7 +295,7 @@ def test_where_blocks_overturn_the_lines_of_a_spectrum_end_in_crosses():
     (crosses,) = [line for line in figure.axes[0].lines if line.get_marker() == "x"]
     np.testing.assert_array_equal(crosses.get_xydata(), [[2.0, 0.2], [4.0, 0.4], [6.0, 0.6]])
     assert entries(figure) == ["beyond: overturns"]
-    standing = curve._replace(singles=0.0 * np.nan_to_num(peaks, posinf=0.0))
+    standing = curve._replace(single_curves=0.0 * np.nan_to_num(peaks, posinf=0.0))
     assert not draw_spectrum(x=x, curves=[standing], fractiles=[0.5], motions=["a"], x_label="p").legends
 
 

@@ -150,16 +150,15 @@ def merge_equal_intensities(intensity: Floats) -> Floats:
 def explain_missing_fit(data: ExceedanceCounts, format_intensity: Callable[[float], str]) -> str | None:
     """Explain why no rising lognormal fits a data set, or return None if one does."""
     log_x, exceedances, trial_counts = data
-    exceeding_log_x, other_log_x = log_x[exceedances > 0], log_x[exceedances < trial_counts]
-    count = round(float(trial_counts.sum()))
-    if not exceeding_log_x.size or not other_log_x.size:
-        quantifier, remedy = ("no", "stronger") if not exceeding_log_x.size else ("every", "weaker")
+    exceeded_x, other_x, count = log_x[exceedances > 0], log_x[exceedances < trial_counts], round(trial_counts.sum())
+    if not exceeded_x.size or not other_x.size:
+        quantifier, remedy = ("no", "stronger") if not exceeded_x.size else ("every", "weaker")
         ends = dict.fromkeys(format_intensity(math.exp(end)) for end in (log_x.min(), log_x.max()))
         return f"{quantifier} outcome of {count} exceeds the limit, at {' to '.join(ends)}; use {remedy} motions"
     if log_x.min() == log_x.max():
         return f"all outcomes are at one intensity, {format_intensity(math.exp(log_x[0]))}; use several intensities"
-    if other_log_x.max() <= exceeding_log_x.min() + _compute_overlap(log_x):
-        low, high = math.exp(other_log_x.max()), math.exp(exceeding_log_x.min())
+    if other_x.max() <= exceeded_x.min() + _compute_overlap(log_x):
+        low, high = math.exp(other_x.max()), math.exp(exceeded_x.min())
         start, others_text = ("below", "above it") if low >= high else ("up to", f"from {format_intensity(high)} on")
         gap = f"{start} {format_intensity(low)} and all do {others_text}"
         return (

@@ -143,8 +143,7 @@ def rocking_spectrum(
     checks.check_grid_size({"motions": len(motions), "blocks": block_count, "p": p_count}, OptionError)
     repeated = bodies.select(np.repeat(np.arange(block_count), p_count))
     resized = repeated.with_p_scaled(np.tile(p_values / median, block_count))
-    table = simulate_many(resized, motions, **options)
-    table = table.transpose("motion", "block")
+    table = simulate_many(resized, motions, **options).transpose("motion", "block")
     outcomes = [table[name].values.reshape(-1, block_count, p_count) for name in RATIO_VARIABLES]
     ratio = compute_ratios(bodies.alpha.min(axis=1)[:, None], *outcomes)
     flat_ratios, tiled_weights = ratio.reshape(-1, p_count), np.tile(block_weights, len(ratio))

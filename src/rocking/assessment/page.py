@@ -159,10 +159,8 @@ def describe_object(assessment: Assessment, k: int) -> list[str]:
         text = f"Half of the motions overturn it at {median}{unit} ({interval}), with a dispersion of {dispersion}, "
         statements.append(f"{text}from {simulations}.")
     statements += _describe_rate(assessment, item)
-    if item.sample_count > 1:
-        statements += [
-            f"Its size is uncertain: the curve is of {item.sample_count} sampled sizes, records of the mean."
-        ]
+    if (count := item.sample_count) > 1:
+        statements.append(f"Its size is uncertain: the curve is of {count} sampled sizes, records of the mean.")
     statements += _describe_sliding(item, data, k)
     for rule in RULES:
         ratios = data[rule].values[k]

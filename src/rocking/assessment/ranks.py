@@ -45,9 +45,8 @@ def compute_ranks(
 def compute_scores(item: ObjectAssessment, weights: Floats, hazard: HazardCurve | None) -> Floats:
     """Compute minus the logarithm of the rate, or the logarithm of the median, for each set of weights of motions."""
     is_known = np.isfinite(item.share)
-    exceedance_counts = weights @ np.where(is_known, item.share, 0.0).T
-    trial_counts = weights @ is_known.T.astype(float)
-    fits = fit_or_limits(ExceedanceCounts(np.log(item.levels), exceedance_counts, trial_counts))
+    exceedances, trial_counts = weights @ np.where(is_known, item.share, 0.0).T, weights @ is_known.T.astype(float)
+    fits = fit_or_limits(ExceedanceCounts(np.log(item.levels), exceedances, trial_counts))
     if hazard is not None:
         log_rates, level_log_rates = compute_log_rate(fits, hazard), compute_log_rate_within(fits, hazard)
         return -np.where(fits.slope > 0.0, log_rates[:, 0], level_log_rates[:, 0])

@@ -168,10 +168,9 @@ class Diagnostics:
 
 def diagnose(search: SearchResult, populations: Floats) -> Diagnostics:
     """Compute the diagnostics of a search from the draws of its posterior."""
-    candidates = search.evidence.candidates
-    effective_count = float(np.median(search.evidence.count_effective(populations)))
+    candidates, effective = search.evidence.candidates, float(np.median(search.evidence.count_effective(populations)))
     bounds_reached = list_bounds_reached(candidates.space, split_populations(populations)[0])
-    return Diagnostics(len(candidates.points), effective_count, search.r_hat, bounds_reached)
+    return Diagnostics(len(candidates.points), effective, search.r_hat, bounds_reached)
 
 
 def list_bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ...]:

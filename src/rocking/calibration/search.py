@@ -219,8 +219,7 @@ _MAX_EXTENSIONS: Final = 2
 
 #: Draws from a posterior, and rounds of moves after each tempering step, for the search and the comparison.
 _SAMPLE_COUNT: Final = 256
-_PROPOSAL_ROUND_COUNT: Final = 2
-_COMPARISON_ROUND_COUNT: Final = 4
+_PROPOSAL_ROUND_COUNT, _COMPARISON_ROUND_COUNT = 2, 4
 
 #: Largest R-hat of agreeing runs: their means differ by less than two thirds of a standard deviation.
 MAX_R_HAT: Final = 1.1
@@ -322,9 +321,7 @@ def compute_r_hat(runs: Floats) -> float:
     return max(compute_from_ranks(values) for values in (runs, np.abs(runs - np.median(runs))))
 
 
-def sample_posterior(
-    evidence: Evidence, count: int, round_count: int, rng: Generator, *, exponent: float = 1.0
-) -> Floats:
+def sample_posterior(evidence: Evidence, count: int, rounds: int, rng: Generator, *, exponent: float = 1.0) -> Floats:
     """Draw populations from the posterior, shape (count, 2 k), or from a tempered one if an exponent is set.
 
     Sequential Monte Carlo (Del Moral, Doucet and Jasra 2006): the centres of the particles start at candidates. Each
@@ -345,7 +342,7 @@ def sample_posterior(
             progress += increase
             indices = resample(_temper_weights(log_ratio, increase), count, rng)
             particles, log_densities = particles[indices], log_densities[:, indices]
-            for _ in range(round_count):
+            for _ in range(rounds):
                 _move_particles(compute_densities, progress, particles, log_densities, rng)
     return particles
 

@@ -228,11 +228,10 @@ class ChatteringMap(DatasetResult):
         ]
         first, second = self.data.outcome.dims
         headline = f"end of the first rocking, over {first} and {second}"
-        flags = self.data.overturned, self._overturns_later()
-        overturned_percent, later_percent = (100.0 * float(values.mean()) for values in flags)
-        later_text = f", {later_percent:.1f} % after a first rest" if later_percent else ""
+        overturned, later = (100.0 * float(flags.mean()) for flags in (self.data.overturned, self._overturns_later()))
+        later_text = f", {later:.1f} % after a first rest" if later else ""
         table = format_table(["outcome", "share of the map"], rows)
-        return f"{headline}\n\n{table}\n\noverturns in the end: {overturned_percent:.1f} %{later_text}"
+        return f"{headline}\n\n{table}\n\noverturns in the end: {overturned:.1f} %{later_text}"
 
     def _overturns_later(self) -> NDArray[np.bool_]:
         """Whether a block overturns after its first rocking has ended with another outcome."""

@@ -66,7 +66,7 @@ def assess(
     if curve is not None:
         settings["measure"] = curve.measure
     settings |= {"polarity": polarity, "clusters": risk_options.parse_clusters(), "confidence": risk_options.confidence}
-    settings |= {"years": risk_options.years}
+    settings["years"] = risk_options.years
     with output_options.folder() as folder:
         objects = read_labelled(inventory, keep_going=True, expected=("name", "friction"))
         loaded = replace(motion_options, keep_going=True).read_all(names, accepts_pairs=True)

@@ -102,8 +102,7 @@ def simulate(
     if start_options.available_friction is not None:
         check_available_friction(start_options.available_friction)  # checked before the simulation
     choose_factors(start_options.precision)
-    summary_names = "available_friction", "precision"
-    summary_options: dict[str, Any] = {name: getattr(start_options, name) for name in summary_names}
+    summary_options = {name: getattr(start_options, name) for name in ("available_friction", "precision")}
     body = block_options.create_bodies()
     options: dict[str, Any] = {**model_options.create_arguments(), **start_options.read_values()}
     flags = {"each": writes_each, "energy": draws_energy}

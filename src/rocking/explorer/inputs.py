@@ -30,7 +30,7 @@ from rocking.explorer.uploads import UploadStore
 from rocking.inputs.bodies import create_block, find_description, write_block_call
 from rocking.inputs.texts import format_arguments
 from rocking.motion.motion import Motion
-from rocking.motion.piecewise import MAX_ACCELERATION, TOO_STRONG_MESSAGE
+from rocking.motion.piecewise import MAX_ACCELERATION, TOO_STRONG
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
 from rocking.solid.solid import compute_plane
@@ -127,7 +127,7 @@ def require_rest(restitutions: Iterable[float]) -> None:
 def check_peak_acceleration(peak: float) -> None:
     """Reject a peak acceleration, m/s^2, that no motion can have, before the motions are created."""
     if peak > MAX_ACCELERATION:
-        raise MotionError(TOO_STRONG_MESSAGE)
+        raise MotionError(TOO_STRONG)
 
 
 def block_to_texts(block: Block) -> dict[str, str]:

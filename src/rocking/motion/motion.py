@@ -353,7 +353,7 @@ class Motion(ProcessingMethods):
         with np.errstate(over="ignore", invalid="ignore"):
             coefficients = self.coefficients * factor
         if not np.all(np.abs(coefficients[:, 0]) <= piecewise.MAX_ACCELERATION) or not np.isfinite(coefficients).all():
-            raise MotionError(piecewise.TOO_STRONG_MESSAGE)
+            raise MotionError(piecewise.TOO_STRONG)
         description, history = self.description.scaled(factor), (*self.history, history_entry)
         fields |= {"description": description, "history": history, "error": self.error * abs(factor)}
         return replace(self, coefficients=coefficients, **fields)

@@ -25,9 +25,7 @@ _STEP_ROUNDING: Final = 4.0 * np.finfo(np.float64).eps
 MAX_ACCELERATION: Final = 1e30
 _MAX_DURATION: Final = 1e15
 
-TOO_STRONG_MESSAGE: Final = (
-    f"the acceleration of a motion must stay below {MAX_ACCELERATION:g} m/s^2: check units and scale"
-)
+TOO_STRONG: Final = f"the acceleration of a motion must stay below {MAX_ACCELERATION:g} m/s^2: check units and scale"
 
 #: Far below any ground motion. Pieces may be shorter, but not change faster than over this time.
 MIN_DURATION: Final = 1e-9
@@ -277,7 +275,7 @@ def check_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Float
         raise MotionError(f"{message}: check its units")
     with np.errstate(over="ignore"):
         if not np.all(evaluate_pieces(np.abs(rows), widths) <= MAX_ACCELERATION):
-            raise MotionError(TOO_STRONG_MESSAGE)
+            raise MotionError(TOO_STRONG)
         if not np.all(evaluate_pieces(np.abs(rows), np.maximum(widths, MIN_DURATION)) <= MAX_ACCELERATION):
             excess = f"it would exceed {MAX_ACCELERATION:g} m/s^2 within {MIN_DURATION:g} s"
             raise MotionError(f"a piece of a motion is too steep: {excess}; check units and times")

@@ -341,11 +341,7 @@ class BlockTable(DatasetResult):
             label = f"{100.0 * float(plotted.fractile):g} % fractile of peak rotation over slenderness"
         else:
             measure, names = _parse_measure(self.data.attrs), [str(name) for name in plotted.limit_state.values]
-            panels, missing, label = (
-                measure.display_factor * plotted.values,
-                "no curve fits",
-                f"median {measure.label}",
-            )
+            panels, missing, label = measure.display_factor * plotted.values, "no curve fits", f"median {measure.label}"
 
         def average(name: str) -> Floats:
             keys = [key for key in (name, f"{name}_plus", f"{name}_minus") if key in parameters]
@@ -438,8 +434,8 @@ def fit_pooled_fragility(
     units, unit_indices = np.unique(compute_block_units(bodies, measure, product.model), return_inverse=True)
     shares = normalise_positive_weights(weights, len(bodies))
     motions = _list_counted_motions(product, measure, larger=larger)
-    scale_count = product.scales.count
-    trial_counts, missing_count = np.zeros((len(motions), scale_count, len(units))), 0
+    scales = product.scales.count
+    trial_counts, missing_count = np.zeros((len(motions), scales, len(units))), 0
     exceedance_counts = {name: np.zeros_like(trial_counts) for name in limits}
     for blocks, ratios in _iterate_peak_ratios(store, measure if larger else None):
         membership = np.where(unit_indices[blocks][:, None] == np.arange(len(units)), shares[blocks][:, None], 0.0)
@@ -456,9 +452,8 @@ def fit_pooled_fragility(
     for name, limit in limits.items():
         data = intensities, exceedance_counts[name][has_trials], trial_counts[has_trials]
         curves.append(fit_curve(name, data, groups, confidence, measure, limit))
-    text = f"{describe_pool(bodies, weights)}, {describe_sample(labels, clusters)}"
-    text += f", {format_count(scale_count, 'scale')}, {product.model} model"
-    text += describe_polarities(product.polarity, is_symmetric=bodies.is_symmetric)
+    text = f"{describe_pool(bodies, weights)}, {describe_sample(labels, clusters)}, {format_count(scales, 'scale')}"
+    text += f", {product.model} model{describe_polarities(product.polarity, is_symmetric=bodies.is_symmetric)}"
     text += ", the larger response" * larger
     return Fragility(
         *(tuple(curves), measure, text, find_single_block(bodies), product.model),
