@@ -8,6 +8,7 @@ import pytest
 
 import rocking
 from rocking.calibration.tables import read_table
+from rocking.core.progress import notes_for
 
 MOTIONS = {"weak": rocking.pulses.one_sine(2.5, 1.0), "strong": rocking.pulses.one_sine(6.0, 1.5)}
 
@@ -243,3 +244,10 @@ def test_the_first_column_names_the_objects_if_no_other_does(tmp_path):
     assert [block.labels["name"] for block in inventory] == ["R01", "R02"]
     path.write_text("Width (mm),Height (mm),Room\n600,2000,B\n800,2200,B\n")
     assert ["name" in block.labels for block in rocking.read_inventory(path)] == [False, False]
+
+
+def test_a_depth_is_not_a_width(tmp_path, capsys):
+    with notes_for("everybody"):
+        rocking.read_inventory(written(tmp_path, "name,width,depth,height\nbox,0.3,0.18,0.9\n"))
+    hint = "depth (blocks rock over their width: give the smaller side of the base as width)"
+    assert hint in capsys.readouterr().err

@@ -14,6 +14,7 @@ from rocking import records, studies
 from rocking.cli import main
 from rocking.core.progress import notes_for
 from rocking.errors import MotionError, RecordError
+from rocking.inputs.notes import list_motion_notes
 from rocking.records import channels, group_components, identify, read
 from rocking.records.formats import source
 from rocking.records.formats.source import Request
@@ -205,6 +206,9 @@ def test_sensors_at_different_places_are_not_paired(tmp_path: Path) -> None:
     below, surface = group_components(tmp_path)
     assert [motion.name for motion in below.pair] == ["TST001 N-S borehole", "TST001 E-W borehole"]
     assert [motion.name for motion in surface.pair] == ["TST001 N-S", "TST001 E-W"]
+    (depth,) = [each for each in list_motion_notes(below.pair[0]) if "below the ground" in each]
+    assert depth == "the channel 'N-S borehole' is below the ground surface, where motions are weaker"
+    assert not any("below the ground" in each for each in list_motion_notes(surface.pair[0]))
 
 
 def test_what_is_no_pair_or_unreadable_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -278,6 +278,8 @@ def _note_labels(file: Path, columns: Sequence[tuple[_Heading, str]]) -> None:
     texts = []
     for heading, cell in columns:
         hint = checks.suggest(heading.name, [*_INPUTS_BY_HEADING], "", 0.8)
+        if heading.name.startswith("depth"):
+            hint = "blocks rock over their width: give the smaller side of the base as width"
         if cell and not heading.input:
             texts.append(f"{cell} ({hint})" if hint else cell)
     if texts:

@@ -70,10 +70,11 @@ def list_motion_notes(motion: Motion) -> tuple[str, ...]:
     >>> list_motion_notes(motion)
     ('the peak acceleration is 8.16 g, more than any ground motion has: are the units right?',)
     """
-    notes = list_reading_notes(motion)
+    notes, direction = list_reading_notes(motion), _find_origin(motion).channel
     if _find_origin(motion).is_vertical:
-        direction = _find_origin(motion).channel
         notes += (f"the channel {direction!r} looks vertical, but it is taken for a horizontal motion",)
+    if "borehole" in direction:
+        notes += (f"the channel {direction!r} is below the ground surface, where motions are weaker",)
     return notes + list_vertical_notes(motion)
 
 
