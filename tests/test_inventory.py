@@ -20,8 +20,7 @@ TABLES = {
     "units in cells": "name,width,height,room\nvase,24cm,1100 mm,12\nstele,40 cm,2 m,14\n",
     "decimal commas": "name;Width (m);Height (m);Room\nvase;0,24;1,1;12\nstele;0,4;2;14\n",
     "a title above": "Hall 3,,,\n,,,\nname,width,height,room\nvase,0.24,1.1,12\nstele,0.4,2.0,14\n,,,\n",
-    "words under names of inputs": "name,width,height,room,Load,Lean\nvase,0.24,1.1,12,full,\n"
-    "stele,0.4,2.0,14,empty,no\n",
+    "words under inputs": "name,width,height,room,Load,Lean\nvase,0.24,1.1,12,full,\nstele,0.4,2.0,14,empty,no\n",
     "short rows": "name,width,height,room,remark\nvase,0.24,1.1,12\nstele,0.4,2.0,14,\n",
 }
 
