@@ -277,11 +277,8 @@ def describe_overlaps(names: Sequence[str], surfaces: Sequence[Surface]) -> tupl
             overlaps.append((common, *(names[surface_of[k]] for k in pair)))
     if not overlaps:
         return ()
-    overlaps.sort(key=lambda pair: -pair[0])
-    texts = []
-    for common, first, second in overlaps[:3]:
-        pair_text = f"{first} and {second}" if first != second else f"two pieces of {first}"
-        texts.append(f"{pair_text} overlap in about {common:.2g} m^3")
-    more = f", and {format_count(len(overlaps) - 3, 'more pair')}" if len(overlaps) > 3 else ""
+    common, first, second = max(overlaps)
+    pair_text = f"{first} and {second}" if first != second else f"two pieces of {first}"
+    more = f" (the largest of {len(overlaps)} overlaps)" if len(overlaps) > 1 else ""
     remedy = "make one surface of the two, cut one out of the other, or, if one is a cavity, turn its normals inwards"
-    return (f"{', '.join(texts)}{more}, which is counted twice: {remedy}",)
+    return (f"{pair_text} overlap in about {common:.2g} m^3{more}, which is counted twice: {remedy}",)
