@@ -266,6 +266,18 @@ def test_the_command_writes_the_report_and_names_what_it_leaves_out(run, tmp_pat
     page = Page((out / "report.html").read_text()).text
     assert "urn (line 3)" in page
     assert "2.0 Hz.csv" in page
+    for options, sentence in (
+        (
+            ("--measure", "pgv"),
+            "--measure must be the measure of the hazard curve, peak ground acceleration (g): omit it",
+        ),
+        (
+            ("--floor", "period=0.4,damping=0.05"),
+            "--hazard describes the ground, not the motion of --floor: omit one of them",
+        ),
+    ):
+        code, _, err = run("assess", tmp_path / "inventory.csv", records, *arguments, *options)
+        assert (code, err.splitlines()[-1]) == (2, f"rocking: {sentence}")
     code, printed, _ = run("assess", tmp_path / "inventory.csv", records, "--count", "6", "--json")
     result = json.loads(printed)
     assert [entry["name"] for entry in result["objects"]] == ["vase", "stele"]
@@ -298,8 +310,13 @@ def test_both_horizontal_channels_of_a_file_are_a_pair_and_its_vertical_is_named
     peaks = [entry["pga_m_s2"] for entry in result["records"]]
     expected = [motion.pga for k in range(4) for motion in (motions[k], motions[k + 4])]
     assert peaks == pytest.approx(expected, rel=0.01)
-    code, _, _ = run("assess", tmp_path / "inventory.csv", records, "--count", "8", "--component", "rotd50")
+    code, printed, _ = run(
+        "assess", tmp_path / "inventory.csv", records, "--count", "8", "--component", "rotd50", "--json"
+    )
     assert code == 0
+    rotated = json.loads(printed)["records"]
+    assert [entry["pga_m_s2"] for entry in rotated] == pytest.approx(peaks, rel=1e-12)
+    assert all(entry["intensity_m_s2"] != entry["pga_m_s2"] for entry in rotated)
     code, _, err = run("ida", records / "station 0.csv", "--width", "0.3", "--height", "1")
     assert code == 2
     assert "3 channels; give --channel as one of 1 'N-S', 2 'E-W', 3 'U-D'" in err

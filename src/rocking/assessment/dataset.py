@@ -104,7 +104,7 @@ def create_dataset(
         add("block motion", rule, ratios, f"demand divided by capacity by the rule {rule}", "1")
     for name, meaning, unit, evaluate_motion in _MOTION_ROWS:
         add("motion", name, [evaluate_motion(motion) for motion in motions.values()], meaning, unit)
-    add("motion", measure.name, compute_intensities([*motions.values()], measure), measure.quantity, _INTENSITY)
+    add("motion", "intensity", compute_intensities([*motions.values()], measure), measure.quantity, _INTENSITY)
     unknown = [name for name in _OPTIONAL_NAMES if np.isnan(variables[name][1]).all()]
     coordinates = {
         **motion_coordinates([*motions.values()]),

@@ -19,6 +19,7 @@ from rocking.assessment.chart import Chart, render_bar, render_intervals
 from rocking.core.constants import STANDARD_GRAVITY, VERSION
 from rocking.core.tables import format_count, list_some, write_text
 from rocking.engine.problem import gather_bodies
+from rocking.motion.scaling import Measure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,10 +46,10 @@ def _render_overview(assessment: Assessment, title: str) -> str:
     """Render the summary table, the figure of all objects, and failures."""
     header, rows = assessment.tabulate()
     labels = assessment.labels
-    cells = []
-    for k, (rank, name, *values) in enumerate(rows):
-        texts = [escape(assessment.label(label, k)) for label in labels]
-        cells.append([rank, f'<a href="#object-{k + 1}">{escape(name)}</a>', *texts, *map(escape, values)])
+    links = [f'<a href="#object-{k + 1}">{escape(row[1])}</a>' for k, row in enumerate(rows)]
+    cells = [[rank, link, *map(escape, values)] for link, (rank, _, *values) in zip(links, rows, strict=True)]
+    texts = [[link, *(escape(assessment.label(name, k)) for name in labels)] for k, link in enumerate(links)]
+    details = f"<h3>Objects</h3>\n{_render_table(['object', *labels], texts, is_dense=True)}" if labels else ""
     hazard = "" if assessment.hazard is None else f" The hazard curve is {escape(repr(assessment.hazard.name))}."
     basis = "return period of overturning" if assessment.hazard is not None else "median intensity"
     confidence = f"{100 * assessment.confidence:g} %"
@@ -58,14 +59,16 @@ def _render_overview(assessment: Assessment, title: str) -> str:
 <p>Intensity measure: {escape(assessment.measure.label)}.{hazard} Intervals have {confidence} confidence. Objects are
 ranked by their {basis}. The ranks in brackets are plausible with {confidence} confidence: the motions are resampled,
 the same ones for all objects.</p>
-{_render_table([*header[:2], *labels, *header[2:]], cells)}
+{_render_table(header, cells)}
+<p>{_describe_factors(assessment)}</p>
 {failure_list}
 <h3>Median intensity of overturning</h3>
 {_render_medians(assessment)}
 <p class="soft">Dots are medians, bars their {confidence} intervals. Without a fitted curve the bar extends from the
 highest level at which the object stands under all motions to the level at which all motions overturn it; an arrow
 marks a bar without an end. The intervals contain the differences between the ground motions, not the errors of the
-model, of the sizes that are taken as known, and of the selection of the motions.</p>"""
+model, of the sizes that are taken as known, and of the selection of the motions.</p>
+{details}"""
 
 
 def _render_object(assessment: Assessment, k: int) -> str:
@@ -91,7 +94,7 @@ def _render_object(assessment: Assessment, k: int) -> str:
     for m, name in enumerate(_shorten_names(assessment.motions)):
         low, high = (scale * float(data[end].values[k, m]) for end in ("stands_up_to", "overturns_at"))
         outcome, peak = _describe_outcome(data, k, m), float(data.peak_over_alpha.values[k, m])
-        recorded_level = scale * float(data[assessment.measure.name].values[m])
+        recorded_level = scale * float(data.intensity.values[m])
         row = [
             escape(name),
             f"{float(data.pga.values[m]) / STANDARD_GRAVITY:.3g}",
@@ -221,8 +224,8 @@ def _render_records(assessment: Assessment) -> str:
         "step, s": ("step", 1.0), "duration, s": ("duration", 1.0), "D5-95, s": ("significant_duration", 1.0),
         "PGA, g": ("pga", STANDARD_GRAVITY), "PGV, m/s": ("pgv", 1.0), "Arias, m/s": ("arias", 1.0),
     }  # fmt: skip
-    if assessment.measure.name not in ("pga", "pgv", "arias"):
-        numbers[assessment.measure.label] = (assessment.measure.name, 1.0 / assessment.measure.display_factor)
+    if assessment.measure not in (Measure("pga"), Measure("pgv"), Measure("arias")):
+        numbers[assessment.measure.label] = ("intensity", 1.0 / assessment.measure.display_factor)
     for title, (name, divisor) in numbers.items():
         columns[title] = [f"{value / divisor:.4g}".replace("nan", "-") for value in data[name].values.tolist()]
     columns["remarks"] = [str(value) for value in data.processing.values]
@@ -234,20 +237,24 @@ def _render_records(assessment: Assessment) -> str:
     return f'<section id="records"><h2>Ground motions</h2>\n{table}</section>'
 
 
+def _describe_factors(assessment: Assessment) -> str:
+    """Describe the factors with which the levels scale the motions."""
+    measure, values = assessment.measure, assessment.data.intensity.values
+    units = compute_block_units(gather_bodies([item.body for item in assessment.objects]), measure, assessment.model)
+    ends = [unit * item.levels[[0, -1], None] for unit, item in zip(units, assessment.objects, strict=True)]
+    low, high = (find_extreme(measure.find_factor(np.array(ends), values)) for find_extreme in (np.min, np.max))
+    text = f"The levels scale the records by factors of {low:.2g} to {high:.2g}."
+    return f"{text} Scaled weak motions differ from strong ones in duration and frequency content."
+
+
 def _render_method(assessment: Assessment, command: str) -> str:
     """Render assumptions, versions and the command."""
     options = assessment.data.attrs
     versions = [f"rocking {VERSION}", f"Python {platform.python_version()}"]
     versions += [f"{name} {metadata.version(name)}" for name in ("numpy", "scipy")]
     polarity = {"both": "Original and reversed motions", "+": "Original motions", "-": "Reversed motions"}
-    measure, values = assessment.measure, assessment.data[assessment.measure.name].values
-    units = compute_block_units(gather_bodies([item.body for item in assessment.objects]), measure, assessment.model)
-    ends = [unit * item.levels[[0, -1], None] for unit, item in zip(units, assessment.objects, strict=True)]
-    low, high = (find_extreme(measure.find_factor(np.array(ends), values)) for find_extreme in (np.min, np.max))
     assumptions = [
         f"Rigid blocks, {assessment.model} model, events located and chattering certified.",
-        f"The levels scale the records by factors of {low:.2g} to {high:.2g}. Scaled weak motions differ from strong "
-        "ones in duration and frequency content.",
         f"{polarity[options['polarity']]}; a symmetric object responds equally to both, which count once.",
         "Fragility: lognormal curve by maximum likelihood; motions are independent, unless they were grouped.",
         "An undecided outcome changes if the motion is scaled by less than 3e-6.",

@@ -24,6 +24,7 @@ from rocking.cli.options import (
     SlipOptions,
 )
 from rocking.cli.output import OUTPUT_OPTIONS, OutputOptions, print_result, skip_on_error
+from rocking.errors import OptionError
 from rocking.inputs.inventory import read_labelled
 from rocking.simulation.ensemble import Polarity
 
@@ -45,7 +46,7 @@ def assess(
     Each object is simulated under the records as they are and scaled to levels of intensity, with its fragility, rank
     and rules of thumb. Objects and records that cannot be read are listed, and do not stop the others. --out contains
     report.html (one page with figures, for the browser and for printing), assessment.xlsx (if openpyxl is installed)
-    and assessment.nc. The measure of --hazard replaces --measure.
+    and assessment.nc. With --hazard, the intensity measure is its measure.
 
     Parameters
     ----------
@@ -60,10 +61,13 @@ def assess(
     polarity
         Motions as they are (+), reversed (-), or both. A symmetric object responds equally to both, which count once.
     """
-    curve = risk_options.read_hazard(measure_options, motion_options.component)
+    curve = risk_options.read_hazard(measure_options, motion_options)
     settings = measure_options.create_arguments(motion_options.component) | model_options.create_arguments()
     settings["levels"] = level_count if settings["levels"] is None else settings["levels"]
     if curve is not None:
+        if measure_options.measure not in ("pga", curve.measure.name):
+            message = f"{{}} must be the measure of the hazard curve, {curve.measure.label}: omit it"
+            raise OptionError(message, "measure", value=measure_options.measure)
         settings["measure"] = curve.measure
     settings |= {"polarity": polarity, "clusters": risk_options.parse_clusters(), "confidence": risk_options.confidence}
     settings["years"] = risk_options.years

@@ -93,7 +93,7 @@ def fragility(
             message = "{} are observed, for their own block and motions: omit {}"
             raise OptionError(message, "outcomes", option)
     bodies = {} if outcomes is not None else block_options.create_block_arguments(model_options)
-    curve = risk_options.read_hazard(measure_options, motion_options.component)
+    curve = risk_options.read_hazard(measure_options, motion_options)
     limits, measure = parse_limit_states(limit_states), measure_options.create_measure(motion_options.component)
     if output_options.out is not None:
         check_nrml_names("taxonomy", taxonomy)

@@ -505,7 +505,7 @@ class RiskOptions(ClusterOptions):
     site: Annotated[int, READ_INTEGER, Parameter(help="Row of OpenQuake's file, from 0.")] = 0
     years: Annotated[float, Parameter(help="Time of the probabilities, years.")] = _DEFAULT_YEARS
 
-    def read_hazard(self, measure_options: IntensityOptions, component: ComponentName) -> HazardCurve | None:
+    def read_hazard(self, measure_options: IntensityOptions, record_options: _RecordOptions) -> HazardCurve | None:
         """Check the numbers, and read the hazard curve, if any, with notes."""
         from rocking.analysis.hazard import HazardCurve
 
@@ -516,8 +516,10 @@ class RiskOptions(ClusterOptions):
                 if is_given:
                     raise OptionError("{} requires a hazard curve; add one with {}, or omit it", name, "hazard")
             return None
-        period: Any = measure_options.periods
-        hazard_curve = HazardCurve.read(self.hazard, site=self.site, period=period, component=component)
+        if "floor" in record_options.supplied_texts():
+            raise OptionError("{} describes the ground, not the motion of {}: omit one of them", "hazard", "floor")
+        settings: Any = {"period": measure_options.periods, "component": record_options.component}
+        hazard_curve = HazardCurve.read(self.hazard, site=self.site, **settings)
         for sentence in list_hazard_notes(hazard_curve.intensity, hazard_curve.measure):
             note(f"{self.hazard}: {sentence}")
         return hazard_curve
