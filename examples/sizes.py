@@ -30,5 +30,5 @@ largest = spectrum.data["size"].where(spectrum.data.overturned_share > 0.0).max(
 for alpha, size in zip((0.1, 0.2), largest, strict=True):
     print(f"slenderness {alpha:g}: the largest block that some record overturns has R = {size:.2f} m")
 
-spectrum.plot(against="size", title="Six records scaled to a PGV of 0.5 m/s")
+spectrum.plot(abscissa="size", title="Six records scaled to a PGV of 0.5 m/s")
 plt.show()
