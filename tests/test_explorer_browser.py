@@ -341,9 +341,11 @@ def test_a_file_is_asked_about_and_shown(opened, tmp_path):
         f"PGA {record.pga / 9.80665:.3g} g" in said and f"lasts {record.duration:.4g} s" in said and "gal" not in said
     )
     assert "motion=ridgecrest" in page.page.url
+    assert page.js(STALE) and "1234 is not used yet" in page.text("#problem")  # results are of the last motion
     page.page.locator("#motion-form .missing button", has_text="0.02 s").click()
     page.until("document.querySelectorAll('#motion-form .missing').length === 1")
     page.rested(lambda: page.page.locator("#motion-form .missing button", has_text="m/s2").first.click())
+    assert not page.js(STALE)
     assert {"dt": "0.02", "units": "m/s2"}.items() <= query_of(page).items()
     page.page.locator("#motion-form button", has_text="change").click()
     page.page.locator("#motion-form .missing button", has_text="0.01 s").click()
@@ -553,6 +555,7 @@ def test_a_diagram_is_read_by_keys_and_opens_a_case(opened):
     page = opened(f"{STATUE}&view=periodic")
     page.until("!document.getElementById('problem').hidden")
     assert "requires a sine" in page.text("#problem") and page.js(MARKED) == ["motion"]
+    assert page.page.locator("#orbit").is_hidden() and page.text("#python") == ""
     page.complaints = [each for each in page.complaints if "422" not in each]
     page.page.goto(f"{page.page.url.partition('?')[0]}?{SINE}&view=periodic&sweep_points=16")
     page.until(COMPUTED["periodic"], timeout=180.0)

@@ -399,6 +399,8 @@ def test_all_that_is_drawn_can_be_dragged(opened):
     page.until("play.textContent === 'Pause'", "the block is let go")
     page.until("location.hash.includes('initial_rotation')", "the tilt is in the address")
     assert numbers(page)["initial_rotation"] > 0.02
+    page.page.locator("#strip .link").click()
+    page.until("page.given.tilt === 0", "the block stands upright under the pulse again")
     page.js("location.hash = 'width=0.4&height=1.6&motion=one-sine:amplitude=4.4,frequency=2'")
     page.until("page.given.amplitude === 4.4", "another pulse is shown")
     assert page.js("page.strip.knobTime") == pytest.approx(0.125, abs=0.01)  # on the first of two equal lobes

@@ -181,7 +181,10 @@ class Page {
     announce(`${files.length - refused.length} of ${files.length} files were read.`);
     if (records.length === 1 && files.length === 1 && this.state.view !== "assess") {
       const row = this.list.rows().find(({key}) => key === records[0].key);
-      if (row) { if (row.missing.length) this.forms.motion.wait(row); else this.restate(this.list.put(this.state.texts, row)); }
+      if (row?.missing.length) {
+        this.forms.motion.wait(row);
+        this.problem(new Problem(`${files[0].name} is not used yet: answer the questions below its name first.`), "settings");
+      } else if (row) this.restate(this.list.put(this.state.texts, row));
     } else if (records.length) { if (this.state.view === "assess") this.views.assess.render(); else this.go("assess"); }
     this.problem(refused.length ? new Problem(refused.join("\n")) : null, "main");
     this.counted("taken");

@@ -1,6 +1,6 @@
 // The case under a sine that never ends: its steady state in the phase plane, and a bifurcation diagram.
 
-import {Latest, json, parts, payload} from "./api.js";
+import {Latest, Problem, json, parts, payload} from "./api.js";
 import {Chart, around, gaps} from "./chart.js";
 import {one} from "./standalone/dom.js";
 import {writeAddress} from "./state.js";
@@ -19,7 +19,7 @@ export class View {
   /** @param {any} page */
   constructor(page) {
     this.page = page;
-    this.latest = new Latest(() => this.run(), (error) => page.problem(error, "view-periodic"));
+    this.latest = new Latest(() => this.run(), (error) => this.settle(error));
     /** @type {AbortController | null} */
     this.running = null;
     /** @type {any} */
@@ -42,7 +42,16 @@ export class View {
     one("sweep-open").addEventListener("click", () => this.open());
   }
 
-  enter() { this.update(); }
+  enter() {
+    offer([], "", null, this.page);
+    this.update();
+  }
+
+  /** @param {unknown} error what went wrong; a diagram of another case does not stay */
+  settle(error) {
+    if (error instanceof Problem) one("orbit").hidden = true;
+    this.page.problem(error, "view-periodic");
+  }
 
   leave() { this.running?.abort(); }
 

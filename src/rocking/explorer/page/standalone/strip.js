@@ -121,10 +121,11 @@ export class Strip {
     const step = stepOf(this.span, Math.max(3, this.width / 110)), first = Math.ceil(this.from / step - 1e-9);
     const ticks = Array.from({length: Math.floor((this.from + this.span) / step + 1e-9) - first + 1}, (_, k) => (first + k) * step);
     const right = this.width - RIGHT, {uplift} = this.page.shown, foot = this.height - BOTTOM + 4;
-    const texts = written(ticks);
+    const texts = written(ticks), ground = text(LEFT, 13, stillGround ? "Tilted: the ground is at rest. Stand it upright again" : "ground, g", "start", stillGround ? "link" : "");
+    if (stillGround) ground.addEventListener("pointerdown", (/** @type {Event} */ event) => { event.stopPropagation(); this.page.change({tilt: 0}); });
     this.axes.replaceChildren(
       draw("path", {d: `M${LEFT} ${this.upper}H${right}M${LEFT} ${this.middle}H${right}${ticks.map((each) => `M${this.x(each)} ${foot - 4}v4`).join("")}`}),
-      text(LEFT, 13, stillGround ? "the ground is at rest while the block is tilted" : "ground, g", "start"), text(LEFT, TOP + (this.height - TOP - GAP - BOTTOM) * UPPER + 14, "rotation", "start"),
+      ground, text(LEFT, TOP + (this.height - TOP - GAP - BOTTOM) * UPPER + 14, "rotation", "start"),
       text(LEFT - 6, this.upper - uplift * this.unit + 4, short(uplift / GRAVITY, 2)), text(LEFT - 6, this.upper + 4, uplift * this.unit > 12 ? "0" : ""),
       ...turns.map(([turned, words]) => text(LEFT - 6, y(turned) + 4, words)), text(LEFT - 6, this.middle + 4, "0"),
       ...ticks.map((each, k) => text(this.x(each), foot + 14, k === ticks.length - 1 ? `${texts[k]} s` : texts[k], "middle")),
