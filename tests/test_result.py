@@ -95,7 +95,7 @@ def test_a_study_leaves_out_what_was_given_up(tmp_path):
     together, each, spectrum = study.fragility(measure="pga"), study.block_fragilities(measure="pga"), study.spectrum()
     assert together.missing_note == direct.missing_note == text
     assert together.curves[0].median == pytest.approx(direct.curves[0].median, rel=1e-9)
-    assert each.data.outcomes.values[0].tolist() == [20.0, 20.0 - missing]
+    assert each.data.trial_count.values[0].tolist() == [20.0, 20.0 - missing]
     for found in (together, each, spectrum):
         assert text in found.summary()
     known = direct.outcomes[direct.outcomes.block == 1]

@@ -39,7 +39,7 @@ _SOON: Final = 10.0
 ROUTES: Final[dict[str, dict[str, int]]] = {
     "/": {"GET": 200},
     "/page/main.js": {"GET": 200},
-    "/page/index.html": {"GET": 200},
+    "/page/index.html": {"GET": 404},  # a template
     "/page/nothing.js": {"GET": 404},
     "/page/..%2fserver.py": {"GET": 404},
     "/api/start": {"GET": 200},
