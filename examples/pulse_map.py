@@ -32,7 +32,7 @@ exact = np.array([brentq(excess, 1.0, 100.0, args=(each,), xtol=1e-14, rtol=1e-1
 
 slender = rocking.Block.from_parameters(p=2.0, alpha=1e-5, restitution=0.9)
 found = rocking.overturning_map(
-    slender, "one-sine", amplitudes=np.linspace(0.5, 15.0, 30), frequencies=w, model="linear"
+    slender, "one-sine", amplitudes=np.linspace(0.5, 15.0, 30), frequencies=w, model="linear", rtol=1e-9
 )
 at_once = found.data.boundary_amplitude.where(found.data.mode_above == 0, drop=True).values
 difference = np.max(np.abs(at_once - exact))
