@@ -297,3 +297,14 @@ def test_rows_of_spectra_are_no_series(tmp_path: Path) -> None:
     (tmp_path / "a.V3").write_text(f"Response and Fourier amplitude spectra\n of 86 periods\n{rows}\n")
     message = refusal(lambda: read(tmp_path / "a.V3", dt=0.01, units="g"))
     assert "this seems to be a response spectrum: its heading names spectra" in message
+
+
+def test_an_assessment_under_vertical_records_alone_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "inventory.csv").write_text("name,width,height\nvase,0.24,1.1\n")
+    folder = tmp_path / "records"
+    folder.mkdir()
+    (folder / "TST001.UD").write_text(written.knet(written.counts(6, 200), direction="6"))
+    with pytest.raises(SystemExit, match="2"):
+        main(["assess", str(tmp_path / "inventory.csv"), str(folder)])
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert error == "rocking: no motion can be used: TST001.UD: this record is vertical (channel 'U-D')"

@@ -24,7 +24,8 @@ from rocking.cli.options import (
     SlipOptions,
 )
 from rocking.cli.output import OUTPUT_OPTIONS, OutputOptions, print_result, skip_on_error
-from rocking.errors import OptionError
+from rocking.core.tables import format_reasons
+from rocking.errors import OptionError, RecordError
 from rocking.inputs.inventory import read_labelled
 from rocking.simulation.ensemble import Polarity
 
@@ -74,6 +75,8 @@ def assess(
     with output_options.folder() as folder:
         objects = read_labelled(inventory, keep_going=True, expected=("name", "friction"))
         loaded = replace(motion_options, keep_going=True).read_all(names, accepts_pairs=True)
+        if not loaded.motions:
+            raise RecordError("no motion can be used: " + "; ".join(format_reasons(loaded.skipped)))
         result = assess_objects(objects, loaded.motions, hazard=curve, sample_count=sample_count, **settings)
         skipped = {name: reason.removeprefix(name).lstrip(",: ") for name, reason in loaded.skipped.items()}
         result = replace(result, skipped=skipped | {**result.skipped})
