@@ -18,7 +18,7 @@ _PROGRAMS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-
 #: How many times slower than it is the processor of a page shall be.
 SLOWDOWN = float(os.environ.get("ROCKING_BROWSER_SLOWDOWN", "1"))
 
-#: Longest wait, s: shorter than the time after which a test is ended, so that its failure names what was waited for.
+#: Longest wait, s, below the time limit of a test, so that a failure names the expected state.
 _MAX_WAIT = 150.0
 
 _FLAGS = (
